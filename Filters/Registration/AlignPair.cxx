@@ -202,7 +202,7 @@ public:
       return result;
     }
     const LocalAlignResult best =
-        Local(found.front().volumeToWorld, middleMm, finestMm_, p_.points, 0, progress.Part(0.8, 0.9), FinalStop);
+        Local(found.front().volumeToWorld, middleMm, finestMm_, p_.points, 0, progress.Part(0.8, 0.9), true);
     result.localSeconds = SecondsSince(start);
     if (!landmarks_.Agrees(best.volumeToWorld)) {
       result.reason = "the pose that fits best contradicts the landmarks: " + landmarks_.Worst(best.volumeToWorld);
@@ -240,7 +240,7 @@ public:
 
 private:
   LocalAlignResult Local(const Pose& start, double coarsestMm, double finestMm, int points, int part, const Progress& progress,
-                         double stopVoxels = LocalAlignParameters().stopVoxels) const
+                         bool isAnswer = false) const
   {
     LocalAlignParameters local;
     local.coarsestMm = coarsestMm;
@@ -248,7 +248,9 @@ private:
     local.points = points;
     local.minimumOverlap = 0.5 * p_.minimumOverlap;
     local.part = part;
-    local.stopVoxels = stopVoxels;
+    local.withInformation = isAnswer;
+    if (isAnswer)
+      local.stopVoxels = FinalStop;
     local.seed = p_.seed;
     local.landmarks = landmarks_;
     return LocalAlign(fixedFeatures_, fixed_.volumeToWorld, movingFeatures_, Rounded(start), local, progress);

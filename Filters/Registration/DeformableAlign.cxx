@@ -33,7 +33,7 @@ constexpr double FromAllBoxes = 0.3;
 
 using Vectors = LatticeEquations::Vectors;
 
-// A value and a weight of every voxel of a grid, as MetricLevel keeps them.
+// A value and a weight of every voxel of a grid, side by side.
 using Seen = std::vector<float>;
 
 // The level whose voxels are of a size: the finest that is not finer.
@@ -46,9 +46,9 @@ const MetricLevel& LevelOf(const MetricPyramid& pyramid, int octave)
 }
 
 // Reads value and weight between voxels; the weight is 0 outside.
-ECHORAMA_HOT void ReadRow(const float* seen, const int* n, const double* positions, int count, float* out)
+ECHORAMA_HOT void ReadRow(const SeenVoxel* seen, const int* n, const double* positions, int count, float* out)
 {
-  const std::ptrdiff_t sy = 2 * static_cast<std::ptrdiff_t>(n[0]), sz = sy * n[1];
+  const std::ptrdiff_t sy = n[0], sz = sy * n[1];
   for (int i = 0; i < count; ++i, positions += 3, out += 2) {
     const double x = positions[0], y = positions[1], z = positions[2];
     out[0] = out[1] = 0.0f;
@@ -57,13 +57,15 @@ ECHORAMA_HOT void ReadRow(const float* seen, const int* n, const double* positio
     const int ix = std::min(static_cast<int>(x), n[0] - 2), iy = std::min(static_cast<int>(y), n[1] - 2),
               iz = std::min(static_cast<int>(z), n[2] - 2);
     const float tx = static_cast<float>(x - ix), ty = static_cast<float>(y - iy), tz = static_cast<float>(z - iz);
-    const float* p = seen + iz * sz + iy * sy + 2 * static_cast<std::ptrdiff_t>(ix);
-    for (int c = 0; c < 2; ++c, ++p) {
-      const float a = p[0] + tx * (p[2] - p[0]), b = p[sy] + tx * (p[sy + 2] - p[sy]);
-      const float d = p[sz] + tx * (p[sz + 2] - p[sz]), e = p[sz + sy] + tx * (p[sz + sy + 2] - p[sz + sy]);
+    const SeenVoxel* p = seen + iz * sz + iy * sy + ix;
+    const auto between = [&](const auto& of) {
+      const auto along = [&](const SeenVoxel* v) { return of(v[0]) + tx * (of(v[1]) - of(v[0])); };
+      const float a = along(p), b = along(p + sy), d = along(p + sz), e = along(p + sz + sy);
       const float lower = a + ty * (b - a), upper = d + ty * (e - d);
-      out[c] = lower + tz * (upper - lower);
-    }
+      return lower + tz * (upper - lower);
+    };
+    out[0] = between([](const SeenVoxel& v) { return v.Value(); });
+    out[1] = between([](const SeenVoxel& v) { return v.Weight(); });
   }
 }
 
@@ -406,7 +408,7 @@ Eigen::AlignedBox3d OverlapBox(const std::vector<DeformableVolume>& fixed, const
   for (int k = 0; k < n[2]; ++k)
     for (int j = 0; j < n[1]; ++j)
       for (int i = 0; i < n[0]; ++i, at += 2) {
-        const double w = static_cast<double>(level.seen[at]);
+        const double w = static_cast<double>(level.seen[at / 2].Weight());
         own += w;
         if (!(w > 0.0) || std::none_of(seen.begin(), seen.end(), [at](const Seen& s) { return s[at] > 0.0f; }))
           continue;

@@ -7,6 +7,9 @@
 // than chance adds, so that volumes are not driven apart; on the last level its mean, because the pull of the
 // overlap alone would shift the answer by some tenths of a voxel.
 //
+// Within 0.002 voxels of the answer the gradient decides too: its root lies a little beside the top of the merit, because weights
+// move with the pose, and from that top no step leads up any more.
+//
 // Step length. Speckle that differs between the volumes has gradients too; Gauss-Newton takes them for signal, its Hessian is
 // too large and its steps too short by the same factor again and again. How much the gradient really changed over the
 // last step tells the factor (a secant), and the next step is longer by it.
@@ -208,7 +211,8 @@ private:
         return;
       for (int d = 0; d < 6; ++d)
         damped(d, d) += damping * damped(d, d) + 1e-9 * std::max(damped(d, d), 1e-6 * most);
-      Vector6 step = -stretch * SolveSymmetric(damped, sums_.gradient);
+      const Vector6 toRoot = SolveSymmetric(damped, sums_.gradient);
+      Vector6 step = -stretch * toRoot;
       if (!step.allFinite())
         return;
       // What the step does to the points of the overlap, at most.
@@ -219,7 +223,9 @@ private:
       const Pose trial = Moved(pose_, centre_, step);
       const Sums sums = At(trial);
       const double trialMerit = Merit(sums, isLast);
-      if (sums.share >= leastShare && trialMerit > merit) {
+      const Vector6 fromTrial = SolveSymmetric(damped, sums.gradient);
+      const bool isCloser = isLast && length < small && sums.gradient.dot(fromTrial) < sums_.gradient.dot(toRoot);
+      if (sums.share >= leastShare && (trialMerit > merit || isCloser)) {
         const double expected = step.dot(sums_.hessian * step), real = step.dot(sums.gradient - sums_.gradient);
         stretch = real > 0.0 ? std::clamp(expected / real, 1.0, 5.0) : 1.0;
         pose_ = trial;
@@ -257,6 +263,8 @@ private:
     result.similarity = sums_.similar / sums_.weight;
     result.score = comparison_->SmallerWeight() > 0.0 ? sums_.similar / comparison_->SmallerWeight() : 0.0;
     result.converged = converged_;
+    if (!p_.withInformation)
+      return result;
     Inform(result);
     result.information += p_.landmarks.At(pose_, centre_).hessian;
     return result;

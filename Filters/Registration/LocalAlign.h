@@ -37,8 +37,9 @@ struct LocalAlignParameters {
   double minimumOverlap = 0.05;
   double stopVoxels = 0.002;
   int part = 0;
-  std::uint64_t seed = 1; ///< of the points
-  LandmarkTerm landmarks; ///< of the same fixedToWorld; none: the images decide alone
+  std::uint64_t seed = 1;      ///< of the points
+  bool withInformation = true; ///< whether the covariance is measured, which costs as much as a dozen steps on the last level
+  LandmarkTerm landmarks;      ///< of the same fixedToWorld; none: the images decide alone
 };
 
 ParameterList Describe(LocalAlignParameters& p);
@@ -54,8 +55,8 @@ struct LocalAlignResult {
   double voxelMm = 0.0; ///< of the last level: the geometric mean of the spacing, the larger of both volumes
   Eigen::Vector3d centre = Eigen::Vector3d::Zero(); ///< world, mm: the centroid of the overlap, about which the twist acts
   /// Inverse covariance of the twist that acts as MotionAbout(centre, rotation, translation) * volumeToWorld. Zero where
-  /// nothing is known (no overlap). Speckle is correlated, so it counts independent blocks of tissue, not voxels. With what the
-  /// landmarks tell.
+  /// nothing is known (no overlap) or nobody asked. Speckle is correlated, so it counts independent blocks of tissue, not voxels.
+  /// With what the landmarks tell.
   Information information = Information::Zero();
   double independentVoxels = 0.0; ///< how many voxels with independent residuals would tell as much
   bool converged = false;         ///< the last step of the last level was below 0.002 voxels, and the volumes overlap

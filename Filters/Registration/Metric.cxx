@@ -3,6 +3,7 @@
 #include "Core/Base/Parallel.h"
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace echorama {
 namespace {
@@ -19,19 +20,19 @@ const std::vector<const Metric*>& Metrics()
 void ExtendByOne(MetricLevel& level)
 {
   const auto& n = level.geometry.dimensions;
-  float* seen = level.seen.data();
+  SeenVoxel* seen = level.seen.data();
   const std::ptrdiff_t row = n[0], slice = row * n[1];
   ParallelFor(n[2], [&](std::ptrdiff_t k) {
     for (int j = 0; j < n[1]; ++j)
       for (int i = 0; i < n[0]; ++i) {
         const std::ptrdiff_t at = k * slice + j * row + i;
-        if (seen[2 * at + 1] > 0.0f)
+        if (seen[at].IsReal())
           continue;
-        float sum = 0.0f, neighbours = 0.0f;
+        int sum = 0, neighbours = 0;
         const auto add = [&](bool inside, std::ptrdiff_t other) {
-          if (inside && seen[2 * other + 1] > 0.0f) {
-            sum += seen[2 * other];
-            neighbours += 1.0f;
+          if (inside && seen[other].IsReal()) {
+            sum += seen[other].value;
+            ++neighbours;
           }
         };
         add(i > 0, at - 1);
@@ -40,8 +41,8 @@ void ExtendByOne(MetricLevel& level)
         add(j + 1 < n[1], at + row);
         add(k > 0, at - slice);
         add(k + 1 < n[2], at + slice);
-        if (neighbours > 0.0f)
-          seen[2 * at] = sum / neighbours;
+        if (neighbours > 0)
+          seen[at].value = static_cast<std::int16_t>(sum / neighbours);
       }
   });
 }
@@ -59,6 +60,21 @@ void Check(const PlacedVolume& volume)
 }
 
 } // namespace
+
+void MetricLevel::CountReal()
+{
+  const std::ptrdiff_t voxels = static_cast<std::ptrdiff_t>(geometry.VoxelCount()), runs = (voxels + RunLength - 1) / RunLength;
+  realBefore.assign(static_cast<std::size_t>(runs + 1), 0);
+  ParallelRanges(runs, 1 << 12, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    for (std::ptrdiff_t run = begin; run < end; ++run) {
+      std::int32_t real = 0;
+      for (std::ptrdiff_t i = run * RunLength; i < std::min(voxels, (run + 1) * RunLength); ++i)
+        real += IsReal(i);
+      realBefore[static_cast<std::size_t>(run + 1)] = real;
+    }
+  });
+  std::partial_sum(realBefore.begin(), realBefore.end(), realBefore.begin());
+}
 
 std::vector<std::string> MetricNames()
 {
@@ -137,6 +153,7 @@ std::shared_ptr<const MetricPyramid> BuildMetricPyramid(const PlacedVolume& volu
     metric.see(source, level);
     if (!level.seen.empty())
       ExtendByOne(level);
+    level.CountReal();
     result->levels.push_back(std::move(level));
   }
 

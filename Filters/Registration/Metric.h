@@ -1,19 +1,54 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "LocalAlign.h"
+#include <array>
+#include <cstdint>
+#include <functional>
 
 namespace echorama {
 
-/// One resolution of a volume as a metric sees it. The voxels of a metric that compares values hold a value and a weight, side
-/// by side in \a seen; those of one that compares descriptors hold sixteen bytes, twelve of the descriptor and one of the
-/// weight. Weights are 0 where a voxel is not real.
+/// A voxel as a metric that compares values sees it, in four bytes: points are read all over a volume, and what is read is what
+/// they cost. The steps are far below speckle.
+struct SeenVoxel {
+  static constexpr float ValueUnit = 1.0f / 1024.0f, WeightUnit = 1.0f / 32767.0f; ///< what one step of each is
+  static constexpr float LargestValue = 32767.0f * ValueUnit;                      ///< values beyond are as large
+
+  std::int16_t value = 0, weight = 0; ///< weight is 0 where the voxel is not real, and nowhere else
+
+  SeenVoxel() = default;
+  SeenVoxel(float v, float w)
+    : value(static_cast<std::int16_t>(Nearest(Between(v, -LargestValue, LargestValue) / ValueUnit))),
+      weight(static_cast<std::int16_t>(w > 0.0f ? Nearest(Between(w / WeightUnit, 1.0f, 32767.0f)) : 0))
+  {
+  }
+  float Value() const { return ValueUnit * static_cast<float>(value); }
+  float Weight() const { return WeightUnit * static_cast<float>(weight); }
+  bool IsReal() const { return weight > 0; }
+
+private:
+  static float Between(float v, float low, float high) { return v > low ? (v < high ? v : high) : low; } // NaN: low
+  static int Nearest(float v) { return static_cast<int>(v + (v < 0.0f ? -0.5f : 0.5f)); }
+};
+
+/// One resolution of a volume as a metric sees it. The voxels of a metric that compares descriptors hold sixteen bytes, twelve of
+/// the descriptor and one of the weight, which is 0 where a voxel is not real.
 struct MetricLevel {
   ImageGeometry geometry;
   double voxelMm = 0.0;                   ///< geometric mean of the spacing
   int octave = 0;                         ///< log2(voxelMm), rounded: windows follow it, so that two volumes are seen alike
-  std::vector<float> seen;                ///< value, weight, value, weight, ...
-  std::vector<float> edges;               ///< the gradient's magnitude and the weight, side by side (lc2), else empty
+  std::vector<SeenVoxel> seen;            ///< of a metric that compares values
+  std::vector<SeenVoxel> edges;           ///< the gradient's magnitude and the weight (lc2), else empty
   std::vector<unsigned char> descriptors; ///< 16 bytes per voxel (mind-ssc), else empty
+  std::vector<std::int32_t> realBefore;   ///< how many real voxels lie before each run of RunLength; the last: how many there are
+
+  static constexpr std::ptrdiff_t RunLength = 64;
+  std::ptrdiff_t RealVoxels() const { return realBefore.back(); }
+  bool IsReal(std::ptrdiff_t voxel) const
+  {
+    const std::size_t i = static_cast<std::size_t>(voxel);
+    return seen.empty() ? descriptors[16 * i + 12] > 0 : seen[i].IsReal();
+  }
+  void CountReal(); ///< fills realBefore
 };
 
 class MetricPyramid {
@@ -105,5 +140,11 @@ std::unique_ptr<LevelComparison> ComparePoints(const ComparisonSetup& setup);
 /// Smooths volumes in place along all three axes with a Gaussian (separable, cut at 2.5 standard deviations, nothing beyond the
 /// border), standard deviations in voxels per axis; below 0.2 an axis is left alone.
 void GaussianSum(VolumeView<float> volume, const Eigen::Vector3d& sigmaVoxels);
+
+/// The same for volumes that nobody needs to hold: \a make(k, slices) fills slice k of each of \a volumes volumes, one behind the
+/// other, and \a use(k, smoothed) gets them smoothed, all k in turn. Chunks of slices run in parallel; some are made twice.
+void SmoothSlices(const std::array<int, 3>& dimensions, int volumes, const Eigen::Vector3d& sigmaVoxels,
+                  const std::function<void(int k, VolumeView<float> slices)>& make,
+                  const std::function<void(int k, VolumeView<const float> smoothed)>& use);
 
 } // namespace echorama

@@ -3,6 +3,7 @@
 // additions, and with it the last digit, does not depend on how wide the machine is.
 #include "MetricBlock.h"
 #include "Core/Base/Multiversion.h"
+#include "Metric.h"
 #include <algorithm>
 #include <cmath>
 
@@ -10,6 +11,7 @@ namespace echorama {
 namespace {
 
 constexpr int Lanes = 16;
+constexpr int ReadAhead = 16; // points
 
 inline double Fold(const float* lanes)
 {
@@ -37,12 +39,16 @@ inline double Dot(const float* a, const float* b, int count = BlockSize)
   return Fold(lanes);
 }
 
-ECHORAMA_HOT void ReadBlock(const Field& field, const Map& m, const Fit& fit, const float* px, const float* py, const float* pz,
-                            const float* value, const float* weight, int count, float* r, float* r2, float* w, float* covered,
-                            float* gx, float* gy, float* gz)
+// Where points lie in a volume that is read: their first voxel, how far beyond it, and whether they are in the grid at all.
+struct Places {
+  int first[BlockSize];
+  float tx[BlockSize], ty[BlockSize], tz[BlockSize], inside[BlockSize];
+};
+
+ECHORAMA_HOT void FindPlaces(const Field& field, const Map& m, const float* px, const float* py, const float* pz, int count,
+                             Places& out)
 {
-  const float* seen = field.seen;
-  const int row = 2 * field.nx, slice = row * field.ny;
+  const int row = field.nx, slice = row * field.ny;
   const int lastX = field.nx - 2, lastY = field.ny - 2, lastZ = field.nz - 2;
   const float endX = static_cast<float>(field.nx - 1), endY = static_cast<float>(field.ny - 1),
               endZ = static_cast<float>(field.nz - 1);
@@ -55,27 +61,70 @@ ECHORAMA_HOT void ReadBlock(const Field& field, const Map& m, const Fit& fit, co
     const float cz = z > 0.0f ? (z < endZ ? z : endZ) : 0.0f;
     const int ix = static_cast<int>(cx), iy = static_cast<int>(cy), iz = static_cast<int>(cz);
     const int i = ix < lastX ? ix : lastX, j = iy < lastY ? iy : lastY, k = iz < lastZ ? iz : lastZ;
-    const float tx = cx - static_cast<float>(i), ty = cy - static_cast<float>(j), tz = cz - static_cast<float>(k);
-    const int c = k * slice + j * row + 2 * i;
-    const float inside = (x >= 0.0f) & (y >= 0.0f) & (z >= 0.0f) & (x <= endX) & (y <= endY) & (z <= endZ) ? 1.0f : 0.0f;
-    const float a0 = seen[c], a1 = seen[c + 2], b0 = seen[c + row], b1 = seen[c + row + 2];
-    const float c0 = seen[c + slice], c1 = seen[c + slice + 2], d0 = seen[c + slice + row], d1 = seen[c + slice + row + 2];
-    const float da = a1 - a0, db = b1 - b0, dc = c1 - c0, dd = d1 - d0;
-    const float a = a0 + tx * da, b = b0 + tx * db, e = c0 + tx * dc, d = d0 + tx * dd;
-    const float ab = a + ty * (b - a), cd = e + ty * (d - e);
-    const float dab = da + ty * (db - da), dcd = dc + ty * (dd - dc);
-    gx[p] = fit.readScale * (dab + tz * (dcd - dab));
-    gy[p] = fit.readScale * ((b - a) + tz * ((d - e) - (b - a)));
-    gz[p] = fit.readScale * (cd - ab);
-    const float ux = 1.0f - tx, uy = 1.0f - ty, uz = 1.0f - tz;
-    const float u = uz * (uy * (ux * seen[c + 1] + tx * seen[c + 3]) + ty * (ux * seen[c + row + 1] + tx * seen[c + row + 3])) +
-                    tz * (uy * (ux * seen[c + slice + 1] + tx * seen[c + slice + 3]) +
-                          ty * (ux * seen[c + slice + row + 1] + tx * seen[c + slice + row + 3]));
-    const float v = ab + tz * (cd - ab);
-    r[p] = fit.readScale * v + fit.readOffset - (fit.valueScale * value[p] + fit.valueOffset);
+    out.tx[p] = cx - static_cast<float>(i);
+    out.ty[p] = cy - static_cast<float>(j);
+    out.tz[p] = cz - static_cast<float>(k);
+    out.first[p] = k * slice + j * row + i;
+    out.inside[p] = (x >= 0.0f) & (y >= 0.0f) & (z >= 0.0f) & (x <= endX) & (y <= endY) & (z <= endZ) ? 1.0f : 0.0f;
+  }
+}
+
+// Value, weight, value, weight of two voxels that lie side by side, in steps.
+inline void TwoVoxels(const SeenVoxel* at, float* out)
+{
+  out[0] = static_cast<float>(at[0].value);
+  out[1] = static_cast<float>(at[0].weight);
+  out[2] = static_cast<float>(at[1].value);
+  out[3] = static_cast<float>(at[1].weight);
+}
+
+// What lies between the voxels: value, index gradient, weight.
+ECHORAMA_HOT void ReadPlaces(const Field& field, const Places& at, int count, float* value, float* weight, float* gx, float* gy,
+                             float* gz)
+{
+  const std::ptrdiff_t row = field.nx, slice = row * field.ny;
+  for (int p = 0; p < count; ++p) {
+    // Points are strewn over a volume that no cache holds: voxels are asked for before they are needed.
+    const SeenVoxel* soon = field.seen + at.first[std::min(p + ReadAhead, count - 1)];
+    __builtin_prefetch(soon);
+    __builtin_prefetch(soon + row);
+    __builtin_prefetch(soon + slice);
+    __builtin_prefetch(soon + slice + row);
+
+    const SeenVoxel* first = field.seen + at.first[p];
+    const float tx = at.tx[p], ty = at.ty[p], tz = at.tz[p];
+    float a[4], b[4], c[4], d[4], all[4], alongY[4], alongZ[4];
+    TwoVoxels(first, a);
+    TwoVoxels(first + row, b);
+    TwoVoxels(first + slice, c);
+    TwoVoxels(first + slice + row, d);
+    for (int l = 0; l < 4; ++l) {
+      const float ba = b[l] - a[l], dc = d[l] - c[l], near = a[l] + ty * ba, far = c[l] + ty * dc;
+      alongY[l] = ba + tz * (dc - ba);
+      alongZ[l] = far - near;
+      all[l] = near + tz * alongZ[l];
+    }
+    gx[p] = all[2] - all[0];
+    value[p] = all[0] + tx * gx[p];
+    weight[p] = all[1] + tx * (all[3] - all[1]);
+    gy[p] = alongY[0] + tx * (alongY[2] - alongY[0]);
+    gz[p] = alongZ[0] + tx * (alongZ[2] - alongZ[0]);
+  }
+}
+
+ECHORAMA_HOT void CompareBlock(const Fit& fit, const float* inside, const float* ours, const float* ourWeight, int count,
+                               float* r, float* r2, float* w, float* covered, float* gx, float* gy, float* gz)
+{
+  const float scale = fit.readScale * SeenVoxel::ValueUnit;
+  for (int p = 0; p < count; ++p) {
+    const float weight = inside[p] * ourWeight[p], u = SeenVoxel::WeightUnit * w[p];
+    r[p] = scale * r[p] + fit.readOffset - (fit.valueScale * ours[p] + fit.valueOffset);
     r2[p] = r[p] * r[p];
-    w[p] = inside * weight[p] * u;
-    covered[p] = u > 1e-6f ? inside * weight[p] : 0.0f;
+    gx[p] *= scale;
+    gy[p] *= scale;
+    gz[p] *= scale;
+    w[p] = weight * u;
+    covered[p] = u > 1e-6f ? weight : 0.0f;
   }
 }
 
@@ -204,8 +253,11 @@ void RawSums::operator+=(const RawSums& o)
 
 void ReadValues(const Field& field, const Map& toIndex, const Fit& fit, const BlockOfPoints& b, Terms& t)
 {
-  ReadBlock(field, toIndex, fit, b.x, b.y, b.z, b.value, b.weight, b.count, t.r, t.r2, t.w, t.covered, t.jacobian[0],
-            t.jacobian[1], t.jacobian[2]);
+  Places places;
+  FindPlaces(field, toIndex, b.x, b.y, b.z, b.count, places);
+  ReadPlaces(field, places, b.count, t.r, t.w, t.jacobian[0], t.jacobian[1], t.jacobian[2]);
+  CompareBlock(fit, places.inside, b.value, b.weight, b.count, t.r, t.r2, t.w, t.covered, t.jacobian[0], t.jacobian[1],
+               t.jacobian[2]);
 }
 
 void ReadDescriptors(const Field& field, const Map& toIndex, const BlockOfPoints& points, Terms& t, Condensed& condensed)

@@ -15,9 +15,11 @@ struct Map {
 };
 Map MapOf(const Eigen::Affine3d& a);
 
+struct SeenVoxel;
+
 /// The voxels of the volume that is read; at least two along each axis.
 struct Field {
-  const float* seen = nullptr;                ///< value, weight, value, weight, ...
+  const SeenVoxel* seen = nullptr;
   const unsigned char* descriptors = nullptr; ///< ChannelStride bytes per voxel
   int nx = 0, ny = 0, nz = 0;
 };

@@ -6,8 +6,14 @@
 //
 // Means and deviations are Gaussian and count real voxels alone, by how far they can be trusted. A floor under the deviation
 // keeps fluid and saturated tissue from being amplified to noise; there the weight is low as well.
+//
+// Windows are wide, so they are worked out at half the resolution, an eighth of the voxels, and read between these; what is
+// compared is smoothed by less than a voxel, at full resolution, slice by slice. Beside the result nothing is ever held that has
+// as many voxels as the volume.
+#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Metric.h"
+#include <algorithm>
 #include <cmath>
 
 namespace echorama {
@@ -19,51 +25,159 @@ constexpr double SmoothVoxels = 0.6; // of what is compared
 // each other. Voxels count by how much of their window is real, from nothing to all between these two.
 constexpr float CutWindow = 0.6f, WholeWindow = 0.95f;
 constexpr double FloorShare = 0.6; // of the level's own standard deviation: the floor under the local one
+constexpr float LeastTrust = 0.01f;
+
+// The sums over the windows, at half the resolution along each axis whose windows are wide enough, with a rim of one cell around.
+class Windows {
+public:
+  Windows(const MetricSource& source, float globalMean, const Eigen::Vector3d& sigmaVoxels)
+  {
+    const auto& n = source.intensity.Dimensions();
+    std::array<int, 3> cells{};
+    Eigen::Vector3d sigma = sigmaVoxels;
+    for (int axis = 0; axis < 3; ++axis) {
+      // Cells and reading between them blur by one voxel: the mean over two, and a triangle over four.
+      step_[axis] = sigmaVoxels[axis] >= 1.4 && n[axis] > 1 ? 2 : 1;
+      if (step_[axis] == 2)
+        sigma[axis] = 0.5 * std::sqrt(sigmaVoxels[axis] * sigmaVoxels[axis] - 1.0);
+      cells[axis] = (n[axis] + step_[axis] - 1) / step_[axis] + 2;
+    }
+    for (Volume<float>& sums : sums_)
+      sums = Volume<float>(cells);
+    Gather(source, globalMean);
+    for (Volume<float>& sums : sums_)
+      GaussianSum(sums.View(), sigma);
+  }
+
+  /// A row of voxels: the weight around each, the mean value times the weight and the mean square times the weight.
+  void Row(int j, int k, const std::array<float*, 3>& out, std::vector<float>& work) const
+  {
+    const Between y(j, step_[1]), z(k, step_[2]);
+    const int cells = sums_[0].Dimensions()[0];
+    work.resize(static_cast<std::size_t>(cells));
+    for (std::size_t n = 0; n < 3; ++n) {
+      const VolumeView<const float> view = sums_[n].View();
+      const float *a = view.Row(y.first, z.first), *b = view.Row(y.second, z.first), *c = view.Row(y.first, z.second),
+                  *d = view.Row(y.second, z.second);
+      const float ya = 1.0f - y.part, za = 1.0f - z.part;
+      for (int i = 0; i < cells; ++i)
+        work[static_cast<std::size_t>(i)] = za * (ya * a[i] + y.part * b[i]) + z.part * (ya * c[i] + y.part * d[i]);
+      Along(work.data(), step_[0] * (cells - 2), out[n]);
+    }
+  }
+
+private:
+  // Between which cells a voxel lies, and how far beyond the first.
+  struct Between {
+    Between(int voxel, int step) : first(voxel / step + 1), second(first)
+    {
+      if (step == 2) {
+        second = voxel % 2 == 0 ? first - 1 : first + 1;
+        part = 0.25f;
+      }
+    }
+    int first, second;
+    float part = 0.0f;
+  };
+
+  void Along(const float* cells, int voxels, float* out) const
+  {
+    if (step_[0] == 1) {
+      std::copy_n(cells + 1, voxels, out);
+      return;
+    }
+    for (int c = 0; c < voxels / 2; ++c) {
+      out[2 * c] = 0.25f * cells[c] + 0.75f * cells[c + 1];
+      out[2 * c + 1] = 0.75f * cells[c + 1] + 0.25f * cells[c + 2];
+    }
+  }
+
+  // The mean weight, value and square of each cell.
+  void Gather(const MetricSource& source, float globalMean)
+  {
+    const auto& n = source.intensity.Dimensions();
+    const VolumeView<float> w = sums_[0].View(), m = sums_[1].View(), s = sums_[2].View();
+    const float share = 1.0f / static_cast<float>(step_[0] * step_[1] * step_[2]);
+    ParallelFor(m.Dimensions()[2] - 2, [&](std::ptrdiff_t slice) {
+      const int c = static_cast<int>(slice);
+      for (int k = c * step_[2]; k < std::min(n[2], (c + 1) * step_[2]); ++k)
+        for (int j = 0; j < n[1]; ++j) {
+          const std::ptrdiff_t row = k * source.intensity.SliceStride() + j * source.intensity.RowStride();
+          const int b = j / step_[1] + 1;
+          float *toMean = m.Row(b, c + 1), *toSquare = s.Row(b, c + 1), *toWeight = w.Row(b, c + 1);
+          for (int i = 0; i < n[0]; ++i) {
+            const float v = source.intensity[row + i];
+            if (!(v == v))
+              continue;
+            const float trust = share * std::fmax(LeastTrust, static_cast<float>(source.Trust(row + i))), d = v - globalMean;
+            const int a = i / step_[0] + 1;
+            toWeight[a] += trust;
+            toMean[a] += trust * d;
+            toSquare[a] += trust * d * d;
+          }
+        }
+    });
+  }
+
+  std::array<int, 3> step_{1, 1, 1};  // voxels of a cell along each axis
+  std::array<Volume<float>, 3> sums_; // of weights, values and squares
+};
+
+// A row, from the sums over what is smoothed and over the windows.
+struct RowSums {
+  const float *smoothWeight, *smoothValue, *weight, *value, *square;
+};
+
+ECHORAMA_HOT void SeeRow(const float* intensity, const RowSums& sums, const float* trust, float floor, int count, SeenVoxel* out)
+{
+  for (int i = 0; i < count; ++i) {
+    const bool real = intensity[i] == intensity[i];
+    const float one = 1.0f / sums.weight[i], mean = sums.value[i] * one, spread = sums.square[i] * one - mean * mean;
+    const float variance = spread > 0.0f ? spread : 0.0f, scale = 1.0f / (variance + floor);
+    const float whole = (sums.weight[i] - CutWindow) * (1.0f / (WholeWindow - CutWindow));
+    const float full = whole > 0.0f ? (whole < 1.0f ? whole : 1.0f) : 0.0f, weight = variance * scale * full * full;
+    const float value = (sums.smoothValue[i] / sums.smoothWeight[i] - mean) * std::sqrt(scale);
+    out[i] = {real ? value : 0.0f, real ? trust[i] * (weight > 1e-3f ? weight : 1e-3f) : 0.0f};
+  }
+}
 
 void SeeLocalNcc(const MetricSource& source, MetricLevel& level)
 {
   const auto& n = level.geometry.dimensions;
-  const std::ptrdiff_t count = source.intensity.Size();
   const double octaveMm = std::exp2(level.octave);
   const Eigen::Vector3d window = (WindowVoxels * octaveMm / level.geometry.spacing.array()).matrix();
   const Eigen::Vector3d smooth = (SmoothVoxels * octaveMm / level.geometry.spacing.array()).matrix();
-
   const MeanAndDeviation global = MeanAndDeviationOf(source);
   const float mean = static_cast<float>(global.mean);
-  Volume<float> weights(n), sums(n), squares(n);
-  const auto w = weights.View(), s = sums.View(), q = squares.View();
-  ParallelRanges(count, 1 << 16, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-    for (std::ptrdiff_t i = begin; i < end; ++i) {
-      const float v = source.intensity[i];
-      if (!(v == v))
-        continue;
-      const float trust = std::fmax(0.01f, static_cast<float>(source.Trust(i))), d = v - mean;
-      w[i] = trust;
-      s[i] = trust * d;
-      q[i] = trust * d * d;
-    }
-  });
-  Volume<float> fineWeights = weights, fineSums = sums;
-  const auto fw = fineWeights.View(), fs = fineSums.View();
-  GaussianSum(w, window);
-  GaussianSum(s, window);
-  GaussianSum(q, window);
-  GaussianSum(fw, smooth);
-  GaussianSum(fs, smooth);
-
-  level.seen.assign(static_cast<std::size_t>(2 * count), 0.0f);
   const float floor = static_cast<float>(FloorShare * FloorShare * global.deviation * global.deviation) + 1e-30f;
-  ParallelRanges(count, 1 << 16, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-    for (std::ptrdiff_t i = begin; i < end; ++i) {
-      if (!(source.intensity[i] == source.intensity[i]))
-        continue;
-      const float m = s[i] / w[i], variance = std::fmax(0.0f, q[i] / w[i] - m * m);
-      const float texture = variance / (variance + floor);
-      const float whole = std::fmin(1.0f, std::fmax(0.0f, (w[i] - CutWindow) / (WholeWindow - CutWindow))), full = whole * whole;
-      level.seen[static_cast<std::size_t>(2 * i)] = (fs[i] / fw[i] - m) / std::sqrt(variance + floor);
-      level.seen[static_cast<std::size_t>(2 * i + 1)] = static_cast<float>(source.Trust(i)) * std::fmax(1e-3f, texture * full);
-    }
-  });
+  const Windows windows(source, mean, window);
+  level.seen.resize(static_cast<std::size_t>(source.intensity.Size()));
+  const std::ptrdiff_t slice = source.intensity.SliceStride();
+  SmoothSlices(
+      n, 2, smooth,
+      [&](int k, VolumeView<float> out) {
+        float *weights = out.Data(), *values = weights + slice;
+        for (std::ptrdiff_t i = 0; i < slice; ++i) {
+          const float v = source.intensity[k * slice + i];
+          const bool real = v == v;
+          weights[i] = real ? std::fmax(LeastTrust, static_cast<float>(source.Trust(k * slice + i))) : 0.0f;
+          values[i] = real ? weights[i] * (v - mean) : 0.0f;
+        }
+      },
+      [&](int k, VolumeView<const float> smoothed) {
+        const std::size_t width = static_cast<std::size_t>(n[0]) + 1; // windows come in pairs of voxels
+        std::vector<float> weight(width), value(width), square(width), trust(width, 1.0f), work;
+        for (int j = 0; j < n[1]; ++j) {
+          const std::ptrdiff_t row = k * slice + j * source.intensity.RowStride();
+          windows.Row(j, k, {weight.data(), value.data(), square.data()}, work);
+          if (!source.reliability.Empty())
+            for (int i = 0; i < n[0]; ++i)
+              trust[static_cast<std::size_t>(i)] = static_cast<float>(source.Trust(row + i));
+          SeeRow(source.intensity.Data() + row,
+                 {smoothed.Row(j, 0), smoothed.Row(j, 1), weight.data(), value.data(), square.data()}, trust.data(), floor, n[0],
+                 level.seen.data() + row);
+        }
+      });
 }
 
 } // namespace

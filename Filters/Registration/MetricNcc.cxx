@@ -11,14 +11,14 @@ void SeeIntensity(const MetricSource& source, MetricLevel& level)
 {
   const MeanAndDeviation global = MeanAndDeviationOf(source);
   const double scale = global.deviation > 0.0 ? 1.0 / global.deviation : 0.0;
-  level.seen.assign(static_cast<std::size_t>(2 * source.intensity.Size()), 0.0f);
+  level.seen.assign(static_cast<std::size_t>(source.intensity.Size()), {});
   ParallelRanges(source.intensity.Size(), 1 << 16, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     for (std::ptrdiff_t i = begin; i < end; ++i) {
       const float v = source.intensity[i];
       if (!(v == v))
         continue;
-      level.seen[static_cast<std::size_t>(2 * i)] = static_cast<float>((static_cast<double>(v) - global.mean) * scale);
-      level.seen[static_cast<std::size_t>(2 * i + 1)] = static_cast<float>(source.Trust(i));
+      level.seen[static_cast<std::size_t>(i)] = {static_cast<float>((static_cast<double>(v) - global.mean) * scale),
+                                                 static_cast<float>(source.Trust(i))};
     }
   });
 }

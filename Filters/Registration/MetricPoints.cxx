@@ -16,7 +16,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
+#include <unordered_map>
 
 namespace echorama {
 namespace {
@@ -31,8 +31,9 @@ constexpr int ChancePairs = 30000, PatchEdge = 5;
 // counts, and in which block of tissue it lies.
 struct Points {
   std::vector<float> x, y, z, value, second, descriptor, weight;
-  std::vector<int> block;
-  double mm3 = 0.0; // that one of them stands for
+  std::vector<int> block;             // its number, once asked for
+  std::vector<Eigen::Vector3f> drawn; // index coordinates; of patches the centres
+  double mm3 = 0.0;                   // that one of them stands for
   double weights = 0.0, squares = 0.0;
 
   std::ptrdiff_t Count() const { return static_cast<std::ptrdiff_t>(x.size()); }
@@ -54,60 +55,34 @@ double Uniform(std::uint32_t bits)
   return static_cast<double>(bits) * (1.0 / 4294967296.0);
 }
 
-// Where points fall, in continuous index coordinates.
-std::vector<Eigen::Vector3f> Draw(const MetricLevel& level, int points, std::uint64_t seed, std::ptrdiff_t& eligible)
+// Where points fall, in continuous index coordinates: one in each stratum of real voxels.
+std::vector<Eigen::Vector3f> Draw(const MetricLevel& level, int points, std::uint64_t seed)
 {
   const auto& n = level.geometry.dimensions;
-  const std::ptrdiff_t slice = static_cast<std::ptrdiff_t>(n[0]) * n[1];
-  const auto counts = [&level](std::ptrdiff_t i) {
-    return level.seen.empty() ? level.descriptors[static_cast<std::size_t>(ChannelStride * i + Channels)] > 0
-                              : level.seen[static_cast<std::size_t>(2 * i + 1)] > 0.0f;
-  };
-  std::vector<std::ptrdiff_t> before(static_cast<std::size_t>(n[2] + 1), 0);
-  ParallelFor(n[2], [&](std::ptrdiff_t k) {
-    std::ptrdiff_t real = 0;
-    for (std::ptrdiff_t i = k * slice; i < (k + 1) * slice; ++i)
-      real += counts(i);
-    before[static_cast<std::size_t>(k + 1)] = real;
-  });
-  for (std::size_t k = 1; k < before.size(); ++k)
-    before[k] += before[k - 1];
-  eligible = before.back();
-  const std::ptrdiff_t count = std::min<std::ptrdiff_t>(points, eligible);
+  const std::ptrdiff_t eligible = level.RealVoxels(), count = std::min<std::ptrdiff_t>(points, eligible);
   std::vector<Eigen::Vector3f> drawn(static_cast<std::size_t>(count));
-  if (count == 0)
-    return drawn;
   const auto first = [&](std::ptrdiff_t s) { return eligible / count * s + eligible % count * s / count; };
-  ParallelFor(n[2], [&](std::ptrdiff_t k) {
-    std::ptrdiff_t rank = before[static_cast<std::size_t>(k)];
-    const std::ptrdiff_t end = before[static_cast<std::size_t>(k + 1)];
-    if (rank == end)
-      return;
-    std::ptrdiff_t stratum = std::max<std::ptrdiff_t>(
-        0,
-        static_cast<std::ptrdiff_t>(static_cast<double>(rank) / static_cast<double>(eligible) * static_cast<double>(count)) - 2);
-    std::array<std::uint32_t, 4> bits{};
-    const auto pick = [&](std::ptrdiff_t s) {
+  ParallelRanges(count, 1 << 12, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    auto run = level.realBefore.begin();
+    for (std::ptrdiff_t s = begin; s < end; ++s) {
       Random random(seed, static_cast<std::uint64_t>(s));
+      std::array<std::uint32_t, 4> bits{};
       for (auto& b : bits)
         b = random.Bits();
-      return first(s) + static_cast<std::ptrdiff_t>(Uniform(bits[0]) * static_cast<double>(first(s + 1) - first(s)));
-    };
-    std::ptrdiff_t wanted = pick(stratum);
-    while (wanted < rank && ++stratum < count)
-      wanted = pick(stratum);
-    for (std::ptrdiff_t i = k * slice; i < (k + 1) * slice && stratum < count && wanted < end; ++i) {
-      if (!counts(i))
-        continue;
-      if (rank++ != wanted)
-        continue;
-      const std::ptrdiff_t inSlice = i - k * slice;
-      drawn[static_cast<std::size_t>(stratum)] = {
+      const std::ptrdiff_t wanted =
+          first(s) + static_cast<std::ptrdiff_t>(Uniform(bits[0]) * static_cast<double>(first(s + 1) - first(s)));
+      if (s == begin)
+        run = std::upper_bound(run, level.realBefore.end(), wanted) - 1;
+      while (run[1] <= wanted)
+        ++run;
+      std::ptrdiff_t voxel = (run - level.realBefore.begin()) * MetricLevel::RunLength;
+      for (std::ptrdiff_t before = *run; !level.IsReal(voxel) || before++ < wanted;)
+        ++voxel;
+      const std::ptrdiff_t inSlice = voxel % (static_cast<std::ptrdiff_t>(n[0]) * n[1]);
+      drawn[static_cast<std::size_t>(s)] = {
           static_cast<float>(static_cast<double>(inSlice % n[0]) + Uniform(bits[1]) - 0.5),
           static_cast<float>(static_cast<double>(inSlice / n[0]) + Uniform(bits[2]) - 0.5),
-          static_cast<float>(static_cast<double>(k) + Uniform(bits[3]) - 0.5)};
-      if (++stratum < count)
-        wanted = pick(stratum);
+          static_cast<float>(static_cast<double>(voxel / (static_cast<std::ptrdiff_t>(n[0]) * n[1])) + Uniform(bits[3]) - 0.5)};
     }
   });
   return drawn;
@@ -125,6 +100,9 @@ public:
       const auto& n = level.geometry.dimensions;
       centres_[side] = level.geometry.Centre();
       worldToIndex_[side] = level.geometry.WorldToIndex();
+      const Eigen::Affine3d toFixed(side == 0 ? Pose::Identity()
+                                              : setup.fixedToWorld.inverse(Eigen::Isometry) * setup.startToWorld);
+      toBlocks_[side] = Eigen::Scaling(1.0 / setup.blockMm) * toFixed * level.geometry.IndexToWorld();
       fields_[side] = {level.seen.data(), level.descriptors.data(), n[0], n[1], n[2]};
       points_[side] = Take(level, side);
     }
@@ -138,7 +116,7 @@ public:
   {
     MetricSums sums;
     if (blocks)
-      blocks->assign(static_cast<std::size_t>(blockCount_), Vector6::Zero());
+      blocks->assign(NumberBlocks(), Vector6::Zero());
     for (int side = 0; side < 2; ++side) {
       const Points& points = points_[side];
       if (points.Count() == 0)
@@ -276,7 +254,7 @@ private:
     sums.hessian += share * hessian;
   }
 
-  // The gradient's parts by blocks of tissue, one point after the other.
+  // The gradient's parts by blocks of tissue: a few ranges of points, each with sums of its own.
   void AddBlocks(const View& view, const RawSums& raw, const Points& points, double factor, BlockGradients& blocks) const
   {
     Vector6 slopes = Vector6::Zero(), theirSlopes = Vector6::Zero();
@@ -284,45 +262,52 @@ private:
       slopes = Eigen::Map<const Vector6>(raw.slopes) / raw.weight;
       theirSlopes = Eigen::Map<const Vector6>(raw.theirSlopes) / raw.weight;
     }
-    for (std::ptrdiff_t b = 0; b < points.Count(); b += BlockSize) {
-      const BlockOfPoints block = points.Block(b, points.Count());
-      CompareWith(view, block, nullptr, [&](const Terms& t) {
-        for (int p = 0; p < block.count; ++p) {
-          const double r = factor * static_cast<double>(t.r[p]), w = static_cast<double>(t.curved[p]);
-          if (w == 0.0)
-            continue;
-          const double theirs =
-              isFitted_ ? static_cast<double>(t.r[p] + view.fit.valueScale * block.value[p] + view.fit.valueOffset) : 0.0;
-          Vector6& sum = blocks[static_cast<std::size_t>(points.block[static_cast<std::size_t>(b + p)])];
-          for (int d = 0; d < 6; ++d)
-            sum[d] += r * (static_cast<double>(t.curvedJ[d][p]) - w * (slopes[d] + theirs * theirSlopes[d]));
-        }
-      });
-    }
+    constexpr std::ptrdiff_t ranges = 16;
+    const std::ptrdiff_t grain = ((points.Count() + ranges - 1) / ranges + BlockSize - 1) / BlockSize * BlockSize;
+    std::vector<BlockGradients> parts(ranges);
+    ParallelRanges(points.Count(), grain, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+      BlockGradients& part = parts[static_cast<std::size_t>(begin / grain)];
+      part.assign(blocks.size(), Vector6::Zero());
+      for (std::ptrdiff_t b = begin; b < end; b += BlockSize) {
+        const BlockOfPoints block = points.Block(b, end);
+        CompareWith(view, block, nullptr, [&](const Terms& t) {
+          for (int p = 0; p < block.count; ++p) {
+            const double r = factor * static_cast<double>(t.r[p]), w = static_cast<double>(t.curved[p]);
+            if (w == 0.0)
+              continue;
+            const double theirs =
+                isFitted_ ? static_cast<double>(t.r[p] + view.fit.valueScale * block.value[p] + view.fit.valueOffset) : 0.0;
+            Vector6& sum = part[static_cast<std::size_t>(points.block[static_cast<std::size_t>(b + p)])];
+            for (int d = 0; d < 6; ++d)
+              sum[d] += r * (static_cast<double>(t.curvedJ[d][p]) - w * (slopes[d] + theirs * theirSlopes[d]));
+          }
+        });
+      }
+    });
+    for (const BlockGradients& part : parts)
+      for (std::size_t i = 0; i < part.size(); ++i)
+        blocks[i] += part[i];
   }
 
   Points Take(const MetricLevel& level, int side)
   {
-    std::ptrdiff_t eligible = 0;
     const int wanted = isPatches_ ? std::max(setup_.points / PatchSize, 16) : setup_.points;
-    const std::vector<Eigen::Vector3f> drawn = Draw(level, wanted, setup_.seed, eligible);
+    const std::vector<Eigen::Vector3f> drawn = Draw(level, wanted, setup_.seed);
     Points points;
     if (drawn.empty())
       return points;
     const std::size_t each = isPatches_ ? PatchSize : 1;
-    points.mm3 = level.geometry.spacing.prod() * static_cast<double>(eligible) / static_cast<double>(drawn.size() * each);
+    points.mm3 =
+        level.geometry.spacing.prod() * static_cast<double>(level.RealVoxels()) / static_cast<double>(drawn.size() * each);
     const Eigen::Affine3d toWorld = level.geometry.IndexToWorld();
-    const Eigen::Affine3d toFixed =
-        side == 0 ? toWorld : Eigen::Affine3d(setup_.fixedToWorld.inverse(Eigen::Isometry) * setup_.startToWorld) * toWorld;
     const Eigen::Vector3d stepInIndex = (std::exp2(level.octave) / level.geometry.spacing.array()).matrix();
 
     // Where, in index coordinates, and which block.
     std::vector<float> x, y, z;
     for (const Eigen::Vector3f& at : drawn) {
-      const Eigen::Vector3i block = (toFixed * at.cast<double>() / setup_.blockMm).array().floor().cast<int>();
-      if (setup_.part != 0 && ((block.sum() % 2 + 2) % 2) + 1 != setup_.part)
+      if (setup_.part != 0 && ((BlockAt(at, side).sum() % 2 + 2) % 2) + 1 != setup_.part)
         continue;
-      points.block.insert(points.block.end(), each, BlockNumber(block));
+      points.drawn.push_back(at);
       for (std::size_t n = 0; n < each; ++n) {
         Eigen::Vector3d offset = Eigen::Vector3d::Zero();
         if (isPatches_) {
@@ -386,11 +371,31 @@ private:
     return points;
   }
 
-  int BlockNumber(const Eigen::Vector3i& block)
+  // The block of tissue that a point (index coordinates) of a volume lies in, as the volumes lay at the start.
+  Eigen::Vector3i BlockAt(const Eigen::Vector3f& at, int side) const
   {
-    const auto [at, isNew] = numbers_.try_emplace({block.x(), block.y(), block.z()}, blockCount_);
-    blockCount_ += isNew;
-    return at->second;
+    return (toBlocks_[side] * at.cast<double>()).array().floor().cast<int>();
+  }
+
+  // Numbers the blocks that hold points, and says how many there are. Seldom asked for, so done only then (by one caller at a
+  // time).
+  std::size_t NumberBlocks() const
+  {
+    if (blockCount_ > 0)
+      return blockCount_;
+    std::unordered_map<std::uint64_t, int> numbers;
+    for (int side = 0; side < 2; ++side) {
+      Points& points = points_[side];
+      const std::size_t each = points.drawn.empty() ? 1 : points.x.size() / points.drawn.size();
+      points.block.clear();
+      for (const Eigen::Vector3f& at : points.drawn) {
+        std::uint64_t key = 0;
+        for (const int along : BlockAt(at, side))
+          key = key << 21 | (static_cast<std::uint64_t>(along) & 0x1fffff);
+        points.block.insert(points.block.end(), each, numbers.try_emplace(key, static_cast<int>(numbers.size())).first->second);
+      }
+    }
+    return blockCount_ = numbers.size();
   }
 
   // The mean loss of points that have nothing to do with each other.
@@ -458,9 +463,9 @@ private:
   std::array<Eigen::Vector3d, 2> centres_;
   std::array<Eigen::Affine3d, 2> worldToIndex_;
   std::array<Field, 2> fields_;
-  std::array<Points, 2> points_;
-  std::map<std::array<int, 3>, int> numbers_;
-  int blockCount_ = 0;
+  std::array<Eigen::Affine3d, 2> toBlocks_; // from index coordinates
+  mutable std::array<Points, 2> points_;    // their blocks are numbered when first asked for
+  mutable std::size_t blockCount_ = 0;
   double chance_ = 2.0;
 };
 

@@ -70,7 +70,7 @@ void Across(float* first, std::ptrdiff_t stride, int n, int width, const Kernel&
   }
 }
 
-void Along(float* row, int n, const Kernel& kernel, std::vector<float>& padded)
+void AlongRow(float* row, int n, const Kernel& kernel, std::vector<float>& padded)
 {
   padded.assign(static_cast<std::size_t>(n + 2 * kernel.reach), 0.0f);
   std::copy_n(row, n, padded.data() + kernel.reach);
@@ -80,6 +80,18 @@ void Along(float* row, int n, const Kernel& kernel, std::vector<float>& padded)
   SumRows(rows.data(), kernel.taps.data(), static_cast<int>(rows.size()), n, row);
 }
 
+// One slice, along x and y.
+void Smooth(VolumeView<float> volume, int k, const Kernel& x, const Kernel& y)
+{
+  const auto& n = volume.Dimensions();
+  std::vector<float> copy;
+  if (!x.taps.empty())
+    for (int j = 0; j < n[1]; ++j)
+      AlongRow(volume.Row(j, k), n[0], x, copy);
+  if (!y.taps.empty())
+    Across(volume.Row(0, k), volume.RowStride(), n[1], n[0], y, copy);
+}
+
 } // namespace
 
 void GaussianSum(VolumeView<float> volume, const Eigen::Vector3d& sigmaVoxels)
@@ -87,19 +99,45 @@ void GaussianSum(VolumeView<float> volume, const Eigen::Vector3d& sigmaVoxels)
   const Kernel x(sigmaVoxels.x()), y(sigmaVoxels.y()), z(sigmaVoxels.z());
   const auto& n = volume.Dimensions();
   if (!x.taps.empty() || !y.taps.empty())
-    ParallelFor(n[2], [&](std::ptrdiff_t k) {
-      std::vector<float> copy;
-      if (!x.taps.empty())
-        for (int j = 0; j < n[1]; ++j)
-          Along(volume.Row(j, static_cast<int>(k)), n[0], x, copy);
-      if (!y.taps.empty())
-        Across(volume.Row(0, static_cast<int>(k)), volume.RowStride(), n[1], n[0], y, copy);
-    });
+    ParallelFor(n[2], [&](std::ptrdiff_t k) { Smooth(volume, static_cast<int>(k), x, y); });
   if (!z.taps.empty())
     ParallelFor(n[1], [&](std::ptrdiff_t j) {
       std::vector<float> copy;
       Across(volume.Row(static_cast<int>(j), 0), volume.SliceStride(), n[2], n[0], z, copy);
     });
+}
+
+void SmoothSlices(const std::array<int, 3>& n, int volumes, const Eigen::Vector3d& sigmaVoxels,
+                  const std::function<void(int k, VolumeView<float> slices)>& make,
+                  const std::function<void(int k, VolumeView<const float> smoothed)>& use)
+{
+  constexpr std::ptrdiff_t chunk = 16;
+  const Kernel x(sigmaVoxels.x()), y(sigmaVoxels.y()), z(sigmaVoxels.z());
+  const std::array<int, 3> size{n[0], n[1], volumes};
+  ParallelRanges(n[2], chunk, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    std::vector<Volume<float>> ring(static_cast<std::size_t>(2 * z.reach + 1), Volume<float>(size));
+    const auto at = [&ring](int k) { return ring[static_cast<std::size_t>(k) % ring.size()].View(); };
+    Volume<float> smoothed(size);
+    std::vector<const float*> rows(ring.size());
+    int made = std::max(0, static_cast<int>(begin) - z.reach);
+    for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k) {
+      const int from = std::max(0, k - z.reach), to = std::min(n[2] - 1, k + z.reach);
+      for (; made <= to; ++made) {
+        make(made, at(made));
+        for (int volume = 0; volume < volumes; ++volume)
+          Smooth(at(made), volume, x, y);
+      }
+      if (z.taps.empty()) {
+        use(k, at(k));
+        continue;
+      }
+      for (int r = from; r <= to; ++r)
+        rows[static_cast<std::size_t>(r - from)] = at(r).Data();
+      SumRows(rows.data(), z.taps.data() + (from - k + z.reach), to - from + 1, static_cast<int>(at(k).Size()),
+              smoothed.View().Data());
+      use(k, smoothed.View());
+    }
+  });
 }
 
 } // namespace echorama

@@ -84,6 +84,19 @@ TEST_P(LocalNccAlignTest, ATighterStopEndsCloserToTheOptimum)
   EXPECT_LT(tight, 0.5 * loose);
 }
 
+TEST_P(LocalNccAlignTest, ThePoseIsTheSameWithoutInformation)
+{
+  const auto a = fixed.As(GetParam()), b = moving.As(GetParam());
+  LocalAlignParameters p = Quick();
+  const LocalAlignResult with = LocalAlign(*a, Pose::Identity(), *b, Knocked(0), p);
+  p.withInformation = false;
+  const LocalAlignResult without = LocalAlign(*a, Pose::Identity(), *b, Knocked(0), p);
+  EXPECT_EQ(with.volumeToWorld.matrix(), without.volumeToWorld.matrix());
+  EXPECT_EQ(with.similarity, without.similarity);
+  EXPECT_FALSE(with.information.isZero());
+  EXPECT_TRUE(without.information.isZero());
+}
+
 TEST_P(LocalAlignTest, SwappedVolumesGiveTheInverse)
 {
   const auto a = fixed.As(GetParam()), b = moving.As(GetParam());

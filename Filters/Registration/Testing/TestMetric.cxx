@@ -201,5 +201,78 @@ TEST(GaussianSum, IsTheSeparableSum)
   }
 }
 
+// Chunks meet, and the last one is shorter.
+TEST(SmoothSlices, IsTheGaussianSumOfWholeVolumes)
+{
+  const std::array<int, 3> n{33, 7, 37};
+  std::array<Volume<float>, 2> volumes{Volume<float>(n), Volume<float>(n)};
+  Random random(2);
+  for (Volume<float>& volume : volumes)
+    for (float& v : volume.View())
+      v = static_cast<float>(random.Uniform());
+  for (const Eigen::Vector3d& sigma :
+       {Eigen::Vector3d(0.7, 0.8, 0.9), Eigen::Vector3d(1.0, 0.1, 2.0), Eigen::Vector3d(0.5, 0.5, 0.1)}) {
+    std::array<Volume<float>, 2> expected = volumes;
+    for (Volume<float>& volume : expected)
+      GaussianSum(volume.View(), sigma);
+    std::vector<int> used(static_cast<std::size_t>(n[2]), 0);
+    double largest = 0.0;
+    SmoothSlices(
+        n, 2, sigma,
+        [&](int k, VolumeView<float> slices) {
+          for (int volume = 0; volume < 2; ++volume)
+            std::copy_n(volumes[static_cast<std::size_t>(volume)].View().Row(0, k), slices.SliceStride(), slices.Row(0, volume));
+        },
+        [&](int k, VolumeView<const float> smoothed) {
+          ++used[static_cast<std::size_t>(k)];
+          for (int volume = 0; volume < 2; ++volume)
+            for (std::ptrdiff_t i = 0; i < smoothed.SliceStride(); ++i)
+              if (std::abs(smoothed.Row(0, volume)[i] - expected[static_cast<std::size_t>(volume)].View().Row(0, k)[i]) > 1e-5f)
+                largest = 1.0;
+        });
+    EXPECT_EQ(largest, 0.0) << sigma.transpose();
+    EXPECT_EQ(used, std::vector<int>(used.size(), 1));
+  }
+}
+
+// The windows are read between cells of two voxels: still the mean and the deviation around each voxel.
+TEST(LocalNcc, SeesWhatIsAroundEachVoxel)
+{
+  const std::array<int, 3> n{31, 28, 26};
+  const ImageGeometry geometry = Box(n, {1.0, 1.0, 1.0}, {0.0, 0.0, 0.0});
+  const Texture texture{3};
+  const Seen seen(geometry,
+                  [&](const Eigen::Vector3d& p) { return static_cast<float>(texture(p)) + 2.0f * static_cast<float>(p.x()); });
+  const auto features = seen.As("local-ncc");
+  const MetricLevel& level = features->levels.front();
+  const VolumeView<const float> in = seen.pyramid.front().intensity.View();
+  double mean = 0.0, square = 0.0;
+  for (const float v : in) {
+    mean += static_cast<double>(v) / static_cast<double>(in.Size());
+    square += static_cast<double>(v * v) / static_cast<double>(in.Size());
+  }
+  const double floor = 0.36 * (square - mean * mean);
+  double error = 0.0, spread = 0.0;
+  for (const auto& [i, j, k] : {std::array<int, 3>{15, 14, 13}, {12, 15, 11}, {17, 12, 14}, {14, 13, 12}, {16, 16, 15}}) {
+    const auto around = [&, i = i, j = j, k = k](double sigma, double power) {
+      const int reach = static_cast<int>(std::lround(2.5 * sigma));
+      double sum = 0.0, weights = 0.0;
+      for (int c = -reach; c <= reach; ++c)
+        for (int b = -reach; b <= reach; ++b)
+          for (int a = -reach; a <= reach; ++a) {
+            const double w = std::exp(-0.5 * (a * a + b * b + c * c) / (sigma * sigma));
+            sum += w * std::pow(static_cast<double>(in(i + a, j + b, k + c)) - mean, power);
+            weights += w;
+          }
+      return sum / weights;
+    };
+    const double m = around(2.0, 1.0), expected = (around(0.6, 1.0) - m) / std::sqrt(around(2.0, 2.0) - m * m + floor);
+    const double found = static_cast<double>(level.seen[static_cast<std::size_t>(&in(i, j, k) - in.Data())].Value());
+    error += (found - expected) * (found - expected);
+    spread += expected * expected;
+  }
+  EXPECT_LT(std::sqrt(error), 0.05 * std::sqrt(spread));
+}
+
 } // namespace
 } // namespace echorama
