@@ -134,7 +134,7 @@ Region RegionOf(RegionOutline outline, VolumeView<const unsigned char> valid, in
     if (region.axes.determinant() < 0.0)
       region.axes.col(2) = -region.axes.col(2);
   }
-  region.cells = Thinned(region.cells, 1 << 16);
+  region.cells = Thinned(region.cells, static_cast<std::size_t>(16.384 * outlinePoints));
   region.sample = Thinned(region.cells, 2000);
   region.few = Thinned(outline.points, 300);
   region.some = Thinned(outline.points, static_cast<std::size_t>(std::min(600, outlinePoints)));

@@ -52,7 +52,7 @@ ProbeArc::Place ProbeArc::PlaceOf(double across, double outward, bool behind) co
   if (angle < straight)
     return {width > 0.0 ? across / width : 0.0, outward};
   const auto [c, u] = GetBend();
-  const double a = c * across, b = u + c * outward, h = std::hypot(a, b);
+  const double a = c * across, b = u + c * outward, h = std::sqrt(a * a + b * b);
   if (behind)
     return {std::atan2(-a, -b) / angle, -(h + u) / c};
   const double depth = h + u > 0.0 ? (a * across + (u + b) * outward) / (h + u) : 0.0;

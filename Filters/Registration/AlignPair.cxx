@@ -18,7 +18,9 @@
 // The search widens as long as there is no clear answer: the automatic start's to larger cones, and beyond a tracker's cone,
 // where little is alike, to more candidates (between ribs, whose shadows look alike at low resolution, the right pose may be the
 // fiftieth). Near the start a search costs a few milliseconds, over all rotations some seconds. What is clear already at the
-// middle level to be no answer is not refined.
+// middle level to be no answer is not refined; nor, while other searches are to come, what is hopeless one level below: there
+// right poses are determined to less than a voxel, and accidents, if they are still alike, to many. It is a candidate of the next
+// search, so nothing is lost by that but time.
 #include "AlignPair.h"
 #include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Error.h"
@@ -49,6 +51,9 @@ constexpr std::size_t Finalists = 5; // of the coarse level
 // layers still fit, by a similarity of some 0.1, and what they say nothing of is nearly undetermined (bench of bodies: other
 // bodies, mirror images).
 constexpr double SureSimilarity = 0.15;
+// A pose whose predicted error is larger, in voxels of the level below the middle, is none that would be called aligned: right
+// poses have 0.1 to 0.8 there, those of accidents 3 to 60 (phantom, bodies, liver; overlaps of 25 to 75%).
+constexpr double HopelessVoxels = 2.5;
 // More candidates can help where the best are less alike than this; what is alike and yet not unique they do not tell apart.
 constexpr double WeakSimilarity = 2.0 * SureSimilarity;
 
@@ -146,6 +151,7 @@ public:
     global.minimumOverlap = p_.minimumOverlap;
     global.candidates = stage.candidates;
     std::vector<Pose> poses{from.volumeToWorld}, free{moving_.volumeToWorld}; // with and without the landmarks
+    poses.insert(poses.end(), refused_.begin(), refused_.end());
     const auto search = [&](const PlacedVolume& moving, const Progress& part) {
       for (const GlobalCandidate& candidate : GlobalSearch(fixed_, moving, global, part).candidates) {
         free.push_back(candidate.volumeToWorld);
@@ -201,8 +207,19 @@ public:
       result.localSeconds = SecondsSince(start);
       return result;
     }
+    const double closerMm = std::max(finestMm_, 0.5 * middleMm);
+    if (closerMm > finestMm_) {
+      const LocalAlignResult closer = Local(found.front().volumeToWorld, middleMm, closerMm, FewerPoints(), 0, {}, true);
+      if (!isLast && ErrorOf(closer) > HopelessVoxels * closer.voxelMm) {
+        refused_.push_back(found.front().volumeToWorld);
+        result.similarity = closer.similarity;
+        result.localSeconds = SecondsSince(start);
+        return result;
+      }
+      found.front() = closer;
+    }
     const LocalAlignResult best =
-        Local(found.front().volumeToWorld, middleMm, finestMm_, p_.points, 0, progress.Part(0.8, 0.9), true);
+        Local(found.front().volumeToWorld, closerMm, finestMm_, p_.points, 0, progress.Part(0.8, 0.9), true);
     result.localSeconds = SecondsSince(start);
     if (!landmarks_.Agrees(best.volumeToWorld)) {
       result.reason = "the pose that fits best contradicts the landmarks: " + landmarks_.Worst(best.volumeToWorld);
@@ -223,11 +240,11 @@ public:
     result.centre = best.centre;
     result.information = best.information;
     const Information covariance = CovarianceOf(best.information, shape_.radius);
-    result.errorMm = shape_.Error(covariance, best.centre, best.volumeToWorld);
+    result.errorMm = ErrorOf(best);
     std::array<Pose, 2> halves;
     for (int half = 0; half < 2; ++half)
-      halves[static_cast<std::size_t>(half)] = Local(best.volumeToWorld, std::max(finestMm_, 0.5 * middleMm), finestMm_,
-                                                     p_.points, half + 1, progress.Part(0.9 + 0.05 * half, 0.95 + 0.05 * half))
+      halves[static_cast<std::size_t>(half)] = Local(best.volumeToWorld, closerMm, finestMm_, p_.points, half + 1,
+                                                     progress.Part(0.9 + 0.05 * half, 0.95 + 0.05 * half))
                                                    .volumeToWorld;
     result.splitMm = shape_.Distance(halves[0], halves[1]);
     Judge(p_, covariance, shape_.radius, result);
@@ -254,6 +271,14 @@ private:
     local.seed = p_.seed;
     local.landmarks = landmarks_;
     return LocalAlign(fixedFeatures_, fixed_.volumeToWorld, movingFeatures_, Rounded(start), local, progress);
+  }
+
+  int FewerPoints() const { return std::min(p_.points, std::max(p_.points / FewPoints, EnoughPoints)); }
+
+  // The predicted root mean square error over the moving volume, mm.
+  double ErrorOf(const LocalAlignResult& found) const
+  {
+    return shape_.Error(CovarianceOf(found.information, shape_.radius), found.centre, found.volumeToWorld);
   }
 
   // To a thousandth of a voxel. The last bits of what an earlier step found depend on the CPU, and would choose other points to
@@ -310,9 +335,8 @@ private:
   {
     std::vector<LocalAlignResult> all, different;
     const double count = static_cast<double>(poses.size());
-    const int points = std::min(p_.points, std::max(p_.points / FewPoints, EnoughPoints));
     for (std::size_t i = 0; i < poses.size(); ++i)
-      all.push_back(Local(poses[i], coarsestMm, finestMm, points, 0,
+      all.push_back(Local(poses[i], coarsestMm, finestMm, FewerPoints(), 0,
                           progress.Part(static_cast<double>(i) / count, static_cast<double>(i + 1) / count)));
     std::stable_sort(all.begin(), all.end(),
                      [](const LocalAlignResult& a, const LocalAlignResult& b) { return Evidence(a) > Evidence(b); });
@@ -338,6 +362,7 @@ private:
   const AlignPairParameters& p_;
   LandmarkTerm landmarks_;
   bool landmarksDecide_ = false;
+  std::vector<Pose> refused_; // hopeless as it seemed, when more searches were to come
   VolumeShape shape_, fixedShape_;
   double finestMm_ = 0.0, coarseMm_ = 0.0, middleMm_ = 0.0;
   double largestTurn_ = HUGE_VAL, largestMoveMm_ = HUGE_VAL; // from the start, radians and mm

@@ -16,6 +16,7 @@
 #include "Core/Imaging/Sampling.h"
 #include "Core/Imaging/ValidPoints.h"
 #include "MaskedCorrelation.h"
+#include "Metric.h"
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -150,33 +151,6 @@ LowResolution Read(const PlacedVolume& volume, const Region& region, double edge
   return low;
 }
 
-// A Gaussian along one axis, sigma in voxels; nothing lies outside.
-void Blur(VolumeView<float> volume, int axis, double sigma)
-{
-  const int half = static_cast<int>(std::ceil(3.0 * sigma));
-  std::vector<float> kernel;
-  for (int i = -half; i <= half; ++i)
-    kernel.push_back(static_cast<float>(std::exp(-0.5 * i * i / (sigma * sigma))));
-  const auto& n = volume.Dimensions();
-  const std::ptrdiff_t stride = axis == 0 ? 1 : axis == 1 ? volume.RowStride() : volume.SliceStride();
-  const int length = n[axis];
-  ParallelFor(axis == 2 ? n[1] : n[2], [&](std::ptrdiff_t outer) {
-    std::vector<float> line(static_cast<std::size_t>(length));
-    for (int inner = 0; inner < (axis == 0 ? n[1] : n[0]); ++inner) {
-      float* first = volume.Data() + outer * (axis == 2 ? volume.RowStride() : volume.SliceStride()) +
-                     inner * (axis == 0 ? volume.RowStride() : 1);
-      for (int p = 0; p < length; ++p) {
-        float sum = 0.0f;
-        for (int q = std::max(0, p - half); q <= std::min(length - 1, p + half); ++q)
-          sum += kernel[static_cast<std::size_t>(q - p + half)] * first[q * stride];
-        line[static_cast<std::size_t>(p)] = sum;
-      }
-      for (int p = 0; p < length; ++p)
-        first[p * stride] = line[static_cast<std::size_t>(p)];
-    }
-  });
-}
-
 // Takes off each value the mean around it and divides by the standard deviation around it, by weight. Gain, and what
 // changes slowly with depth, are gone afterwards; the variance of all becomes 1.
 void Normalise(LowResolution& low, double sigmaMm)
@@ -199,8 +173,7 @@ void Normalise(LowResolution& low, double sigmaMm)
     }
   variance /= std::max(low.weights, 1e-9);
   for (const VolumeView<float>& volume : {w, v, s})
-    for (int axis = 0; axis < 3; ++axis)
-      Blur(volume, axis, sigmaMm / low.edge);
+    GaussianSum(volume, Eigen::Vector3d::Constant(sigmaMm / low.edge));
   double total = 0.0;
   for (std::ptrdiff_t i = 0; i < voxels.Size(); ++i)
     if (voxels[i].real() > 0.0f) {
@@ -239,13 +212,22 @@ public:
       return {};
     const int i = static_cast<int>(x), j = static_cast<int>(y), k = static_cast<int>(z);
     const float tx = x - static_cast<float>(i), ty = y - static_cast<float>(j), tz = z - static_cast<float>(k);
+    // Two voxels that lie side by side are four numbers: first between rows and slices, four at once, then between the two.
     const Complex* c = voxels_ + k * slice_ + j * row_ + i;
-    const auto between = [](Complex a, Complex b, float t) { return a + (b - a) * t; };
-    return between(between(between(c[0], c[1], tx), between(c[row_], c[row_ + 1], tx), ty),
-                   between(between(c[slice_], c[slice_ + 1], tx), between(c[slice_ + row_], c[slice_ + row_ + 1], tx), ty), tz);
+    const float *first = Numbers(c), *above = Numbers(c + row_), *behind = Numbers(c + slice_),
+                *both = Numbers(c + slice_ + row_);
+    float sum[4];
+    for (int l = 0; l < 4; ++l) {
+      const float near = first[l] + ty * (above[l] - first[l]), far = behind[l] + ty * (both[l] - behind[l]);
+      sum[l] = near + tz * (far - near);
+    }
+    return {sum[0] + tx * (sum[2] - sum[0]), sum[1] + tx * (sum[3] - sum[1])};
   }
 
 private:
+  // An array of complex numbers is one of twice as many real ones.
+  static const float* Numbers(const Complex* c) { return reinterpret_cast<const float*>(c); }
+
   const Complex* voxels_;
   std::ptrdiff_t row_, slice_;
   Eigen::Vector3f end_;

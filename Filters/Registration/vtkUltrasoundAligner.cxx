@@ -3,7 +3,7 @@
 
 #include "AlignmentJson.h"
 #include "Core/Geometry/MatrixRows.h"
-#include "Core/Imaging/ShadowMap.h"
+#include "PreparedVolume.h"
 #include "vtkImageData.h"
 #include "vtkMatrix4x4.h"
 #include "vtkNew.h"
@@ -20,25 +20,16 @@ vtkUltrasoundParametersMacro(vtkUltrasoundAligner);
 
 namespace {
 
-// A volume at falling resolution, and how much its voxels count.
-struct Prepared {
-  std::vector<echorama::PyramidLevel> Pyramid, Reliability;
-};
-
-Prepared Prepare(const vtkUltrasoundVolume::Input& volume, bool withReliability, const echorama::Progress& progress)
+echorama::PreparedVolume Prepare(const vtkUltrasoundVolume::Input& volume, bool withReliability,
+                                 const echorama::Progress& progress)
 {
-  Prepared prepared;
+  const auto geometry = vtkUltrasoundAcquisition::ProbeGeometryOf(volume.Image);
+  const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(volume.Image);
+  const auto probe = geometry && pose ? std::optional(echorama::PlacedProbe{*geometry, *pose}) : std::nullopt;
+  echorama::PreparedVolume prepared;
   vtkUltrasoundVolume::Dispatch(volume.Intensity, [&](auto type) {
-    const auto posed = vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(volume);
-    prepared.Pyramid = echorama::BuildPyramid(posed, {}, progress.Part(0.0, 0.3));
-    if (withReliability && prepared.Pyramid.front().realVoxels > 0) {
-      const auto geometry = vtkUltrasoundAcquisition::ProbeGeometryOf(volume.Image);
-      const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(volume.Image);
-      const auto probe = geometry && pose ? std::optional(echorama::PlacedProbe{*geometry, *pose}) : echorama::FindProbe(posed);
-      const auto reliability = echorama::ReliabilityMap(posed, probe, {}, progress.Part(0.3, 0.8));
-      prepared.Reliability = echorama::BuildPyramid(echorama::PosedVolume<float>{reliability.View(), posed.valid, posed.geometry},
-                                                    {}, progress.Part(0.8, 1.0));
-    }
+    prepared =
+        echorama::PrepareVolume(vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(volume), withReliability, probe, progress);
   });
   return prepared;
 }
@@ -126,7 +117,7 @@ void vtkUltrasoundAligner::Execute(vtkInformationVector** inputs, vtkInformation
 
   // 1. the resolutions of each volume
   const auto begin = std::chrono::steady_clock::now();
-  std::vector<Prepared> prepared;
+  std::vector<echorama::PreparedVolume> prepared;
   std::vector<echorama::PlacedVolume> placed(volumes.size());
   for (std::size_t i = 0; i < volumes.size(); ++i) {
     const double count = static_cast<double>(volumes.size());
@@ -134,8 +125,8 @@ void vtkUltrasoundAligner::Execute(vtkInformationVector** inputs, vtkInformation
                                progress.Part(0.1 * static_cast<double>(i) / count, 0.1 * static_cast<double>(i + 1) / count)));
   }
   for (std::size_t i = 0; i < volumes.size(); ++i) {
-    placed[i].pyramid = &prepared[i].Pyramid;
-    placed[i].reliability = prepared[i].Reliability.empty() ? nullptr : &prepared[i].Reliability;
+    placed[i].pyramid = &prepared[i].pyramid;
+    placed[i].reliability = prepared[i].reliability.empty() ? nullptr : &prepared[i].reliability;
     placed[i].name = volumes[i].Name;
     placed[i].landmarks = landmarks[i];
   }

@@ -18,12 +18,12 @@
 //   BenchmarkAlign [TRIALS [CASE...]]     default: 8 of each case: near far liver; and on request: anywhere
 #include "Core/Base/Random.h"
 #include "Core/Imaging/BorderZeros.h"
-#include "Core/Imaging/ShadowMap.h"
 #include "Core/Imaging/ValidPoints.h"
 #include "Filters/Phantoms/Phantom.h"
 #include "Filters/Phantoms/PhantomViews.h"
 #include "Filters/Registration/AlignmentScore.h"
 #include "Filters/Registration/AlignPair.h"
+#include "Filters/Registration/PreparedVolume.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/VolumeFile.h"
 #include "Testing/Benchmark.h"
@@ -114,21 +114,15 @@ struct Answer {
 };
 using Contestant = std::function<Answer(const BenchmarkPair&, const Pose& start)>;
 
-std::vector<PyramidLevel> ReliabilityOf(const PosedVolume<unsigned char>& volume)
-{
-  const Volume<float> map = ReliabilityMap(volume, FindProbe(volume));
-  return BuildPyramid(PosedVolume<float>{map.View(), volume.valid, volume.geometry});
-}
-
 Answer Ours(const BenchmarkPair& pair, const Pose& start)
 {
   PairAlignment found;
   const double before = benchmark::CpuSeconds();
   const double seconds = benchmark::Seconds([&] {
     const AlignPairParameters parameters;
-    const auto pa = BuildPyramid(pair.a.Posed()), pb = BuildPyramid(pair.b.Posed(start));
-    const auto ra = ReliabilityOf(pair.a.Posed()), rb = ReliabilityOf(pair.b.Posed(start));
-    const PlacedVolume a{&pa, Pose::Identity(), "A", &ra}, b{&pb, Pose::Identity(), "B", &rb};
+    const PreparedVolume pa = PrepareVolume(pair.a.Posed(), true), pb = PrepareVolume(pair.b.Posed(start), true);
+    const PlacedVolume a{&pa.pyramid, Pose::Identity(), "A", &pa.reliability},
+        b{&pb.pyramid, Pose::Identity(), "B", &pb.reliability};
     found = AlignPair(a, BuildMetricPyramid(a, parameters.metric), b, BuildMetricPyramid(b, parameters.metric), parameters);
   });
   return {found.volumeToWorld, found.verdict == Verdict::Aligned, seconds, benchmark::CpuSeconds() - before};
@@ -279,6 +273,7 @@ int main(int argc, char** argv)
       liver[0].a = LiverVolume((folder / "liver_volume_A.mha").string());
       liver[0].b = LiverVolume((folder / "liver_volume_B.mha").string());
       liver[0].Finish();
+      Compete("liver, from 6 degrees and 8 mm", Knocked(liver, 6, 6.0, 8.0, count));
       Compete("liver, from 25 degrees and 40 mm", Knocked(liver, 4, 25.0, 40.0, count));
     } else {
       std::cerr << "skipped: there are no liver volumes in " << folder << "\n";
