@@ -95,6 +95,22 @@ const Metric& MetricNamed(const std::string& name)
   throw Error(Error::Kind::InvalidParameter, "there is no metric \"" + name + "\"; there are " + known);
 }
 
+RowSpans::RowSpans(VolumeView<const float> intensity)
+  : rows_(static_cast<std::size_t>(intensity.Dimensions()[1])),
+    spans_(rows_ * static_cast<std::size_t>(intensity.Dimensions()[2]))
+{
+  const auto isReal = [](float v) { return v == v; };
+  ParallelFor(intensity.Slices(), [&](std::ptrdiff_t k) {
+    for (std::size_t j = 0; j < rows_; ++j) {
+      const float *row = intensity.Row(static_cast<int>(j), static_cast<int>(k)), *end = row + intensity.RowStride();
+      const float* first = std::find_if(row, end, isReal);
+      while (end > first && !isReal(end[-1]))
+        --end;
+      spans_[static_cast<std::size_t>(k) * rows_ + j] = {static_cast<int>(first - row), static_cast<int>(end - row)};
+    }
+  });
+}
+
 MeanAndDeviation MeanAndDeviationOf(const MetricSource& source)
 {
   struct Sum {
@@ -106,12 +122,16 @@ MeanAndDeviation MeanAndDeviationOf(const MetricSource& source)
     }
   };
   const auto sum = [&source](const auto& of) {
-    return ParallelSum<Sum>(source.intensity.Size(), 1 << 16, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    return ParallelSum<Sum>(source.intensity.Slices(), 1, [&](std::ptrdiff_t k, std::ptrdiff_t) {
       Sum s;
-      for (std::ptrdiff_t i = begin; i < end; ++i) {
-        const double v = static_cast<double>(source.intensity[i]), trust = v == v ? source.Trust(i) : 0.0;
-        if (trust > 0.0)
-          s += {trust, trust * of(v)};
+      for (int j = 0; j < source.intensity.Dimensions()[1]; ++j) {
+        const RowSpan span = source.spans.At(j, static_cast<int>(k));
+        const std::ptrdiff_t row = k * source.intensity.SliceStride() + j * source.intensity.RowStride();
+        for (std::ptrdiff_t i = row + span.first; i < row + span.end; ++i) {
+          const double v = static_cast<double>(source.intensity[i]), trust = v == v ? source.Trust(i) : 0.0;
+          if (trust > 0.0)
+            s += {trust, trust * of(v)};
+        }
       }
       return s;
     });
@@ -147,7 +167,7 @@ std::shared_ptr<const MetricPyramid> BuildMetricPyramid(const PlacedVolume& volu
     level.geometry = in.geometry;
     level.voxelMm = std::cbrt(in.geometry.spacing.prod());
     level.octave = static_cast<int>(std::lround(std::log2(level.voxelMm)));
-    MetricSource source{in.intensity.View(), {}};
+    MetricSource source{in.intensity.View(), {}, RowSpans(in.intensity.View())};
     if (volume.reliability && l < volume.reliability->size())
       source.reliability = (*volume.reliability)[l].intensity.View();
     metric.see(source, level);

@@ -58,10 +58,35 @@ public:
   Eigen::Vector3d centre = Eigen::Vector3d::Zero(); ///< the centroid of the finest level's voxels, as its geometry stands, mm
 };
 
+/// Part of a row of voxels.
+struct RowSpan {
+  int first = 0, end = 0;
+  bool Empty() const { return end <= first; }
+  int Size() const { return end - first; }
+  void Add(const RowSpan& other) ///< what lies between, too
+  {
+    if (!other.Empty())
+      *this = Empty() ? other : RowSpan{other.first < first ? other.first : first, other.end > end ? other.end : end};
+  }
+};
+
+/// The part of each row of a volume in which its real voxels lie: of a fan in its box a third or a quarter of all.
+class RowSpans {
+public:
+  RowSpans() = default;
+  explicit RowSpans(VolumeView<const float> intensity); ///< NaN where not real
+  RowSpan At(int j, int k) const { return spans_[static_cast<std::size_t>(k) * rows_ + static_cast<std::size_t>(j)]; }
+
+private:
+  std::size_t rows_ = 0;
+  std::vector<RowSpan> spans_;
+};
+
 /// What is read to build one level.
 struct MetricSource {
   VolumeView<const float> intensity;   ///< NaN where not real
   VolumeView<const float> reliability; ///< [0, 1]; empty: all 1
+  RowSpans spans;                      ///< of the intensity
   double Trust(std::ptrdiff_t i) const { return reliability.Empty() ? 1.0 : Clamped(reliability[i]); }
 
 private:
@@ -142,8 +167,9 @@ std::unique_ptr<LevelComparison> ComparePoints(const ComparisonSetup& setup);
 void GaussianSum(VolumeView<float> volume, const Eigen::Vector3d& sigmaVoxels);
 
 /// The same for volumes that nobody needs to hold: \a make(k, slices) fills slice k of each of \a volumes volumes, one behind the
-/// other, and \a use(k, smoothed) gets them smoothed, all k in turn. Chunks of slices run in parallel; some are made twice.
-void SmoothSlices(const std::array<int, 3>& dimensions, int volumes, const Eigen::Vector3d& sigmaVoxels,
+/// other, where they are not 0: in the spans of its rows; \a use(k, smoothed) gets them smoothed, and may look there. Chunks of
+/// slices run in parallel; some are made twice.
+void SmoothSlices(const std::array<int, 3>& dimensions, int volumes, const Eigen::Vector3d& sigmaVoxels, const RowSpans& spans,
                   const std::function<void(int k, VolumeView<float> slices)>& make,
                   const std::function<void(int k, VolumeView<const float> smoothed)>& use);
 

@@ -49,20 +49,20 @@ public:
       GaussianSum(sums.View(), sigma);
   }
 
-  /// A row of voxels: the weight around each, the mean value times the weight and the mean square times the weight.
-  void Row(int j, int k, const std::array<float*, 3>& out, std::vector<float>& work) const
+  /// Part of a row of voxels: the weight around each, the mean value times the weight and the mean square times the weight.
+  void Row(int j, int k, const RowSpan& span, const std::array<float*, 3>& out, std::vector<float>& work) const
   {
     const Between y(j, step_[1]), z(k, step_[2]);
-    const int cells = sums_[0].Dimensions()[0];
-    work.resize(static_cast<std::size_t>(cells));
+    const int first = span.first / step_[0], end = (span.end - 1) / step_[0] + 1; // cells, but for the rim
+    work.resize(static_cast<std::size_t>(sums_[0].Dimensions()[0]));
     for (std::size_t n = 0; n < 3; ++n) {
       const VolumeView<const float> view = sums_[n].View();
       const float *a = view.Row(y.first, z.first), *b = view.Row(y.second, z.first), *c = view.Row(y.first, z.second),
                   *d = view.Row(y.second, z.second);
       const float ya = 1.0f - y.part, za = 1.0f - z.part;
-      for (int i = 0; i < cells; ++i)
+      for (int i = first; i < end + 2; ++i)
         work[static_cast<std::size_t>(i)] = za * (ya * a[i] + y.part * b[i]) + z.part * (ya * c[i] + y.part * d[i]);
-      Along(work.data(), step_[0] * (cells - 2), out[n]);
+      Along(work.data(), first, end, out[n]);
     }
   }
 
@@ -80,13 +80,13 @@ private:
     float part = 0.0f;
   };
 
-  void Along(const float* cells, int voxels, float* out) const
+  void Along(const float* cells, int first, int end, float* out) const
   {
     if (step_[0] == 1) {
-      std::copy_n(cells + 1, voxels, out);
+      std::copy(cells + first + 1, cells + end + 1, out + first);
       return;
     }
-    for (int c = 0; c < voxels / 2; ++c) {
+    for (int c = first; c < end; ++c) {
       out[2 * c] = 0.25f * cells[c] + 0.75f * cells[c + 1];
       out[2 * c + 1] = 0.75f * cells[c + 1] + 0.25f * cells[c + 2];
     }
@@ -105,7 +105,8 @@ private:
           const std::ptrdiff_t row = k * source.intensity.SliceStride() + j * source.intensity.RowStride();
           const int b = j / step_[1] + 1;
           float *toMean = m.Row(b, c + 1), *toSquare = s.Row(b, c + 1), *toWeight = w.Row(b, c + 1);
-          for (int i = 0; i < n[0]; ++i) {
+          const RowSpan span = source.spans.At(j, k);
+          for (int i = span.first; i < span.end; ++i) {
             const float v = source.intensity[row + i];
             if (!(v == v))
               continue;
@@ -154,28 +155,37 @@ void SeeLocalNcc(const MetricSource& source, MetricLevel& level)
   level.seen.resize(static_cast<std::size_t>(source.intensity.Size()));
   const std::ptrdiff_t slice = source.intensity.SliceStride();
   SmoothSlices(
-      n, 2, smooth,
+      n, 2, smooth, source.spans,
       [&](int k, VolumeView<float> out) {
-        float *weights = out.Data(), *values = weights + slice;
-        for (std::ptrdiff_t i = 0; i < slice; ++i) {
-          const float v = source.intensity[k * slice + i];
-          const bool real = v == v;
-          weights[i] = real ? std::fmax(LeastTrust, static_cast<float>(source.Trust(k * slice + i))) : 0.0f;
-          values[i] = real ? weights[i] * (v - mean) : 0.0f;
+        for (int j = 0; j < n[1]; ++j) {
+          const RowSpan span = source.spans.At(j, k);
+          const std::ptrdiff_t row = k * slice + j * source.intensity.RowStride();
+          float *weights = out.Row(j, 0), *values = out.Row(j, 1);
+          for (int i = span.first; i < span.end; ++i) {
+            const float v = source.intensity[row + i];
+            const bool real = v == v;
+            weights[i] = real ? std::fmax(LeastTrust, static_cast<float>(source.Trust(row + i))) : 0.0f;
+            values[i] = real ? weights[i] * (v - mean) : 0.0f;
+          }
         }
       },
       [&](int k, VolumeView<const float> smoothed) {
         const std::size_t width = static_cast<std::size_t>(n[0]) + 1; // windows come in pairs of voxels
         std::vector<float> weight(width), value(width), square(width), trust(width, 1.0f), work;
         for (int j = 0; j < n[1]; ++j) {
-          const std::ptrdiff_t row = k * slice + j * source.intensity.RowStride();
-          windows.Row(j, k, {weight.data(), value.data(), square.data()}, work);
+          const RowSpan span = source.spans.At(j, k);
+          if (span.Empty())
+            continue;
+          windows.Row(j, k, span, {weight.data(), value.data(), square.data()}, work);
+          const int first = span.first;
+          const std::ptrdiff_t start = k * slice + j * source.intensity.RowStride() + first;
           if (!source.reliability.Empty())
-            for (int i = 0; i < n[0]; ++i)
-              trust[static_cast<std::size_t>(i)] = static_cast<float>(source.Trust(row + i));
-          SeeRow(source.intensity.Data() + row,
-                 {smoothed.Row(j, 0), smoothed.Row(j, 1), weight.data(), value.data(), square.data()}, trust.data(), floor, n[0],
-                 level.seen.data() + row);
+            for (int i = 0; i < span.Size(); ++i)
+              trust[static_cast<std::size_t>(i)] = static_cast<float>(source.Trust(start + i));
+          SeeRow(source.intensity.Data() + start,
+                 {smoothed.Row(j, 0) + first, smoothed.Row(j, 1) + first, weight.data() + first, value.data() + first,
+                  square.data() + first},
+                 trust.data(), floor, span.Size(), level.seen.data() + start);
         }
       });
 }

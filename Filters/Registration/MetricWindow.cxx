@@ -107,34 +107,65 @@ void GaussianSum(VolumeView<float> volume, const Eigen::Vector3d& sigmaVoxels)
     });
 }
 
-void SmoothSlices(const std::array<int, 3>& n, int volumes, const Eigen::Vector3d& sigmaVoxels,
+void SmoothSlices(const std::array<int, 3>& n, int volumes, const Eigen::Vector3d& sigmaVoxels, const RowSpans& spans,
                   const std::function<void(int k, VolumeView<float> slices)>& make,
                   const std::function<void(int k, VolumeView<const float> smoothed)>& use)
 {
   constexpr std::ptrdiff_t chunk = 16;
   const Kernel x(sigmaVoxels.x()), y(sigmaVoxels.y()), z(sigmaVoxels.z());
   const std::array<int, 3> size{n[0], n[1], volumes};
+  // Where a row is not nothing, before and after it was smoothed along x, and after its neighbours along y were added.
+  const auto wider = [&](int j, int k) {
+    const RowSpan span = spans.At(j, k);
+    return span.Empty() ? span : RowSpan{std::max(0, span.first - x.reach), std::min(n[0], span.end + x.reach)};
+  };
   ParallelRanges(n[2], chunk, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     std::vector<Volume<float>> ring(static_cast<std::size_t>(2 * z.reach + 1), Volume<float>(size));
     const auto at = [&ring](int k) { return ring[static_cast<std::size_t>(k) % ring.size()].View(); };
-    Volume<float> smoothed(size);
-    std::vector<const float*> rows(ring.size());
+    Volume<float> alongX(size), smoothed(size);
+    std::vector<float> padded;
+    std::vector<const float*> rows(std::max(ring.size(), y.taps.size()));
+    const auto fill = [&](int k) {
+      const VolumeView<float> in = y.taps.empty() ? at(k) : alongX.View(), out = at(k);
+      std::fill(in.begin(), in.end(), 0.0f);
+      make(k, in);
+      for (int volume = 0; volume < volumes; ++volume)
+        for (int j = 0; j < n[1] && !x.taps.empty(); ++j)
+          if (const RowSpan span = wider(j, k); !span.Empty())
+            AlongRow(in.Row(j, volume) + span.first, span.Size(), x, padded);
+      for (int j = 0; j < n[1] && !y.taps.empty(); ++j) {
+        const int from = std::max(0, j - y.reach), to = std::min(n[1] - 1, j + y.reach);
+        RowSpan reached;
+        for (int r = from; r <= to; ++r)
+          reached.Add(wider(r, k));
+        for (int volume = 0; volume < volumes; ++volume) {
+          std::fill_n(out.Row(j, volume), n[0], 0.0f);
+          if (reached.Empty())
+            continue;
+          for (int r = from; r <= to; ++r)
+            rows[static_cast<std::size_t>(r - from)] = in.Row(r, volume) + reached.first;
+          SumRows(rows.data(), y.taps.data() + (from - j + y.reach), to - from + 1, reached.Size(),
+                  out.Row(j, volume) + reached.first);
+        }
+      }
+    };
     int made = std::max(0, static_cast<int>(begin) - z.reach);
     for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k) {
       const int from = std::max(0, k - z.reach), to = std::min(n[2] - 1, k + z.reach);
-      for (; made <= to; ++made) {
-        make(made, at(made));
-        for (int volume = 0; volume < volumes; ++volume)
-          Smooth(at(made), volume, x, y);
-      }
+      for (; made <= to; ++made)
+        fill(made);
       if (z.taps.empty()) {
         use(k, at(k));
         continue;
       }
-      for (int r = from; r <= to; ++r)
-        rows[static_cast<std::size_t>(r - from)] = at(r).Data();
-      SumRows(rows.data(), z.taps.data() + (from - k + z.reach), to - from + 1, static_cast<int>(at(k).Size()),
-              smoothed.View().Data());
+      for (int j = 0; j < n[1]; ++j)
+        if (const RowSpan span = spans.At(j, k); !span.Empty())
+          for (int volume = 0; volume < volumes; ++volume) {
+            for (int r = from; r <= to; ++r)
+              rows[static_cast<std::size_t>(r - from)] = at(r).Row(j, volume) + span.first;
+            SumRows(rows.data(), z.taps.data() + (from - k + z.reach), to - from + 1, span.Size(),
+                    smoothed.View().Row(j, volume) + span.first);
+          }
       use(k, smoothed.View());
     }
   });
