@@ -132,14 +132,16 @@ void SoundTracer::Follow(Way& way, const RayStart& start, SoundPath& path, RaySa
 {
   SceneRay& ray = way.ray;
   int inMaterial = scene_.MediumOf(ray.inside);
+  const double leastReflected = std::max(leastAmplitude_, start.leastReflected);
+  const double least = way.bounces > 0 ? leastReflected : leastAmplitude_;
   double begin = 0.0; // of the next segment, along the ray
   const auto echo = [&](double pressure) {
-    if (std::abs(way.amplitude * pressure) > leastAmplitude_)
+    if (std::abs(way.amplitude * pressure) > least)
       path.echoes.push_back({way.scanDepth, way.amplitude * pressure, way.way, way.bounces});
   };
   const auto reflect = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& direction, const Eigen::Vector3d& across,
                            const BodySet& inside, double amplitude, bool mayMeetFace) {
-    if (!(std::abs(amplitude) > leastAmplitude_) || way.bounces >= transport_.maxBounces)
+    if (!(std::abs(amplitude) > leastReflected) || way.bounces >= transport_.maxBounces)
       return;
     Way& reflection = reflections.emplace_back();
     reflection.ray.origin = from;
@@ -166,11 +168,10 @@ void SoundTracer::Follow(Way& way, const RayStart& start, SoundPath& path, RaySa
     if (meets)
       length = std::clamp(crossing.distance - begin, 0.0, length);
     const double atEnd = way.amplitude * std::exp(-medium.attenuation * length);
-    const bool fades = !(std::abs(atEnd) > leastAmplitude_);
+    const bool fades = !(std::abs(atEnd) > least);
     if (fades) // the segment ends where it does
-      length = medium.attenuation > 0.0
-                   ? std::clamp(std::log(std::abs(way.amplitude) / leastAmplitude_) / medium.attenuation, 0.0, length)
-                   : 0.0;
+      length = medium.attenuation > 0.0 ? std::clamp(std::log(std::abs(way.amplitude) / least) / medium.attenuation, 0.0, length)
+                                        : 0.0;
     if (length > 0.0) {
       SoundSegment& segment = path.segments.emplace_back();
       segment.from = from;

@@ -38,6 +38,8 @@ struct RayStart {
   BodySet inside;                                       ///< AcousticScene::BodiesAt(origin)
   double scanDepth = 0.0;                               ///< mm that it has behind it: for sub-apertures
   double amplitude = 1.0;                               ///< there and back
+  /// What has been reflected is not followed, nor its echoes kept, below this amplitude; the dynamic range counts too.
+  double leastReflected = 0.0;
 };
 
 /// Follows rays through a scene: the direct way first, bent where the speed of sound changes, then what was reflected, and what

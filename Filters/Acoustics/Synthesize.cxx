@@ -110,6 +110,11 @@ public:
   {
     for (const Material& material : scene.Materials())
       brightestDb_ = std::max(brightestDb_, material.backscatterDb);
+    double gain = std::max(p.receiver.GainDbAt(p.probe.depthMin), p.receiver.GainDbAt(p.probe.depthMax));
+    for (const Receiver::GainPoint& point : p.receiver.tgcPoints)
+      gain = std::max(gain, p.receiver.GainDbAt(point.depthMm));
+    const double hidden = std::max(leastDb_ - gain, p.receiver.noiseDb - p.invisibleDb);
+    leastEcho_ = std::pow(10.0, 0.05 * (hidden - p.mirrorDb));
   }
 
   static DepthAxis InternalAxis(const SynthesisParameters& p)
@@ -143,13 +148,20 @@ public:
     }
 
     ways.directAmplitude.assign(static_cast<std::size_t>(axis_.count), 0.0f);
+    std::vector<RaySamples> all;
+    std::vector<RayStart> starts;
     double sum = 0.0;
     for (int ray = 0; ray < p_.subRays; ++ray) {
-      RaySamples samples = SamplesOf(beam, ray);
-      RayStart start = SubRayOf(axis, p_.transducer, samples);
+      all.push_back(SamplesOf(beam, ray));
+      starts.push_back(SubRayOf(axis, p_.transducer, all.back()));
+      sum += WeightOf(starts.back(), axis, p_.transducer);
+    }
+    for (int ray = 0; ray < p_.subRays; ++ray) {
+      RaySamples& samples = all[static_cast<std::size_t>(ray)];
+      RayStart& start = starts[static_cast<std::size_t>(ray)];
       start.inside = scene_.BodiesAt(start.origin);
       const double weight = WeightOf(start, axis, p_.transducer);
-      sum += weight;
+      start.leastReflected = leastEcho_ * sum / weight;
       tracer_.Trace(start, path, &samples);
       rays += path.rays;
       AddDirect(path, weight, axis_, ways.directAmplitude);
@@ -244,6 +256,7 @@ private:
   SoundTracer tracer_;
   double brightestDb_; // of all materials
   double leastDb_;     // below this nothing shows
+  double leastEcho_;   // amplitude of which a perfect mirror's echo is hidden: in the noise, or below black after all gain
 };
 
 // How far from a way of sound scatterers are heard, mm.

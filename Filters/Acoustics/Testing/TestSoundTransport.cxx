@@ -436,6 +436,39 @@ TEST(SoundTransport, WaysEndBelowTheDynamicRange)
   }
 }
 
+TEST(SoundTransport, WeakReflectionsAreLeftOut)
+{
+  TissueSurface surface = Background(water);
+  AddBox(surface, dense, {-90, -90, 30}, {90, 90, 32});
+  AddBox(surface, dense, {-90, -90, 45}, {90, 90, 300});
+  const AcousticScene scene(surface);
+  RayStart start;
+  const SoundPath all = TracePath(scene, Transport(0.2), Conditions(), start);
+  start.leastReflected = 0.02;
+  const SoundPath some = TracePath(scene, Transport(0.2), Conditions(), start);
+  CheckSound(scene, some);
+  EXPECT_LT(some.rays, all.rays);
+  EXPECT_LT(some.segments.size(), all.segments.size());
+  // Nothing is lost by attenuation here: what is louder was followed all the way, and the direct way is untouched.
+  const auto listed = [&](const SoundPath& path) {
+    std::vector<std::pair<double, double>> list;
+    for (const SurfaceEcho& echo : path.echoes)
+      if (echo.bounces == 0 || std::abs(echo.amplitude) > start.leastReflected)
+        list.emplace_back(echo.scanDepth, echo.amplitude);
+    return list;
+  };
+  EXPECT_EQ(listed(some), listed(all));
+  EXPECT_EQ(listed(some).size(), some.echoes.size());
+  EXPECT_GT(std::count_if(some.echoes.begin(), some.echoes.end(), [](const SurfaceEcho& echo) { return echo.bounces > 0; }), 0);
+  const auto direct = [](const SoundPath& path) {
+    double length = 0.0;
+    for (const SoundSegment& s : path.segments)
+      length += s.bounces == 0 ? s.length : 0.0;
+    return length;
+  };
+  EXPECT_EQ(direct(some), direct(all));
+}
+
 TEST(SoundTransport, StartsInsideAnObject)
 {
   TissueSurface surface = Background(water);
