@@ -13,6 +13,7 @@
 #include <fcntl.h>
 #include <filesystem>
 #include <limits>
+#include <set>
 #include <sys/file.h>
 #include <unistd.h>
 
@@ -155,6 +156,7 @@ void Read(Backup& backup)
     BackupStamp stamp;
     ReadProject(backup.path, &stamp);
     backup.label = stamp.label;
+    backup.inPlaceOf = stamp.inPlaceOf;
     backup.readable = stamp.number > 0; // a project without a stamp was not written here
   } catch (const Error&) {
     backup.readable = false;
@@ -163,8 +165,16 @@ void Read(Backup& backup)
 
 std::vector<Backup> Opened(std::vector<Backup> backups)
 {
-  for (Backup& backup : backups)
+  std::set<fs::path> replaced;
+  for (Backup& backup : backups) {
     Read(backup);
+    if (backup.inPlaceOf > 0)
+      for (const Backup& other : backups)
+        if (other.number == backup.inPlaceOf && fs::path(other.path).parent_path() == fs::path(backup.path).parent_path())
+          replaced.insert(other.path);
+  }
+  backups.erase(std::remove_if(backups.begin(), backups.end(), [&](const Backup& each) { return replaced.count(each.path) > 0; }),
+                backups.end());
   return backups;
 }
 
@@ -207,6 +217,15 @@ bool Backups::Write(const Project& project, const std::string& label, bool inPla
   stamp.number = earlier.empty() ? 1 : earlier.front().number + 1;
   stamp.time = std::time(nullptr);
   stamp.label = label;
+  const bool replaces = inPlaceOfLast && !lastPath_.empty();
+  bool goesAtOnce = false;
+  if (replaces) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    goesAtOnce = !unsynced_.empty() && unsynced_.back() == lastPath_; // on a slow disk they do not pile up
+    if (goesAtOnce)
+      unsynced_.pop_back();
+    stamp.inPlaceOf = goesAtOnce ? lastStamp_.inPlaceOf : lastStamp_.number;
+  }
   std::string path;
   try {
     do
@@ -216,18 +235,23 @@ bool Backups::Write(const Project& project, const std::string& label, bool inPla
     std::string reason = error.what();
     for (std::size_t at = 0; (at = reason.find(path)) != std::string::npos;)
       reason.replace(at, path.size(), folder_);
+    if (goesAtOnce) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      unsynced_.push_back(lastPath_);
+    }
     throw Error(error.GetKind(), reason);
+  }
+  if (goesAtOnce) {
+    std::error_code ignored;
+    fs::remove(lastPath_, ignored);
   }
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (inPlaceOfLast && !unsynced_.empty() && unsynced_.back() == lastPath_) { // on a slow disk these do not pile up
-      std::error_code ignored;
-      fs::remove(lastPath_, ignored);
-      unsynced_.pop_back();
-    } else if (inPlaceOfLast && !lastPath_.empty())
+    if (replaces && !goesAtOnce)
       replaced_.push_back(lastPath_);
     unsynced_.push_back(path);
   }
+  lastStamp_ = stamp;
   last_ = project;
   lastPath_ = path;
   unsaved_.push_back(path);

@@ -16,6 +16,7 @@ struct Backup {
   std::int64_t time = 0; ///< of writing, seconds since 1970, UTC
   std::string label;     ///< the edit it was made after
   bool readable = true;  ///< false: damaged; it is kept, listed and not opened
+  int inPlaceOf = 0;     ///< the number of an earlier one that goes: it is not listed, also when a kill has left it
 };
 
 /// A folder of numbered project files. Each is written under a temporary name and renamed: a kill at any moment leaves every
@@ -76,6 +77,7 @@ private:
   int lock_ = -1;
   std::optional<Project> last_;
   std::string lastPath_;
+  BackupStamp lastStamp_;
   std::vector<std::string> unsaved_;
   std::mutex mutex_; ///< of what follows
   std::vector<std::string> unsynced_, replaced_;

@@ -217,6 +217,8 @@ void CheckBackup(Json& root, const JsonPlace& file, BackupStamp& stamp)
   Json& backup = root["backup"];
   const JsonPlace place = file.In("backup");
   stamp.number = Count(place.Member(backup, "number"), place.In("number"));
+  if (backup.contains("inPlaceOf"))
+    stamp.inPlaceOf = Count(backup["inPlaceOf"], place.In("inPlaceOf"));
   const Json& time = place.Member(backup, "time");
   if (!time.is_number_integer())
     place.In("time").Fail("a whole number is needed");
@@ -383,6 +385,8 @@ std::string TextOf(const Project& project, const std::string& path, const Backup
   try {
     if (stamp) {
       root["backup"] = {{"number", stamp->number}, {"time", stamp->time}, {"label", stamp->label}};
+      if (stamp->inPlaceOf > 0)
+        root["backup"]["inPlaceOf"] = stamp->inPlaceOf;
       root["backup"]["checksum"] = TextChecksum(root.dump());
     }
     return root.dump(stamp ? -1 : 1) + '\n';

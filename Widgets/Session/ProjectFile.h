@@ -27,6 +27,7 @@ struct BackupStamp {
   int number = 0;
   std::int64_t time = 0; ///< of writing, seconds since 1970, UTC
   std::string label;     ///< the edit it was made after
+  int inPlaceOf = 0;     ///< the number of an earlier one that goes, or 0
 };
 
 /// A project on disk: {"schema": "echorama-project-1", "unit": "mm", "frame": "LPS", "volumes": [{"name", "file", "path",

@@ -140,11 +140,15 @@ TEST_F(BackupFolder, NumberedTheNewestFirst)
   EXPECT_TRUE(backups.Write(Step(3), "three"));
   backups.Sync();
   EXPECT_TRUE(backups.Write(Step(4), "three, going on", true));
-  EXPECT_EQ(backups.List().size(), 4u) << "what is on the disk stays until the one in its place is, too";
+  const auto files = [this] { return std::distance(fs::directory_iterator(folder), {}); };
+  EXPECT_EQ(files(), 5) << "the lock, too: what is on the disk stays until the one in its place is";
   EXPECT_TRUE(backups.Write(Step(5), "three, going on", true));
-  EXPECT_EQ(backups.List().size(), 4u) << "what is not goes at once";
+  EXPECT_EQ(files(), 5) << "what is not goes at once";
+  ASSERT_EQ(backups.List().size(), 3u) << "what will go is not told of";
+  EXPECT_EQ(backups.List()[1].label, "two");
   EXPECT_TRUE(backups.Write(Step(4), "three, going on", true));
   backups.Sync();
+  EXPECT_EQ(files(), 4);
   const std::vector<Backup> list = backups.List();
   ASSERT_EQ(list.size(), 3u);
   EXPECT_EQ(list[0].label, "three, going on");
