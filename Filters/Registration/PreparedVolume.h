@@ -12,9 +12,8 @@ struct PreparedVolume {
   std::vector<PyramidLevel> pyramid, reliability;
 };
 
-/// What an alignment needs of a volume. Reliability (ReliabilityMap) follows the beams of \a probe; without one, of the probe that
-/// explains where the volume is real, fitted as exactly as shadows need it.
-/// \throws as BuildPyramid and ReliabilityMap.
+/// What an alignment needs of a volume. Reliability (ReliabilityMap) follows the beams of \a probe; without one, of the probe
+/// that explains where the volume is real, fitted as exactly as shadows need it. \throws as BuildPyramid and ReliabilityMap.
 template <class T>
 PreparedVolume PrepareVolume(const PosedVolume<T>& volume, bool withReliability, const std::optional<PlacedProbe>& probe = {},
                              const Progress& progress = {});

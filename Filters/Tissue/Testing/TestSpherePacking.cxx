@@ -197,6 +197,7 @@ TEST(SpherePacking, TheFirstPlaceWithRoomIsTaken)
     for (const double gap : {0.0, 0.25})
       for (const double radiusMin : {0.8, 0.5}) { // equal ones, and some sizes
         Parameters p = Small();
+        p.boxMax = {-5, 25, 20};
         p.region = region;
         p.radii = Parameters::Radii::Uniform;
         p.radiusMin = radiusMin;
