@@ -7,7 +7,7 @@
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
-#include "Core/Base/RandomBlocks.h"
+#include "RandomBlocks.h"
 #include "VectorMath.h"
 #include <algorithm>
 #include <cmath>

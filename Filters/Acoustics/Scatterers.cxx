@@ -20,7 +20,7 @@
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
-#include "Core/Base/RandomBlocks.h"
+#include "RandomBlocks.h"
 #include "ScattererCache.h"
 #include <algorithm>
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Random.h"
-#include "Core/Base/RandomBlocks.h"
+#include "Filters/Acoustics/RandomBlocks.h"
 #include "Filters/Acoustics/VectorMath.h"
 #include <algorithm>
 #include <gtest/gtest.h>
