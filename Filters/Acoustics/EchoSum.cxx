@@ -101,13 +101,13 @@ ECHORAMA_HOT void AddEchoes(const BrickView& v, const Sieved& in, int count, flo
     alignas(64) int place[lanes];
     for (int i = 0; i < lanes; ++i) {
       const float late = in.late[begin + i];
-      const float size = in.amplitude[begin + i] * Exponential(std::min(std::max(in.exponent[begin + i], -80.0f), 80.0f));
+      const float size = in.amplitude[begin + i] * Exponential(std::min(80.0f, std::max(-80.0f, in.exponent[begin + i])));
       float cosine, sine;
       CosineAndSine(startTurn + turnsPerMm * late, cosine, sine);
       re[i] = size * cosine;
       im[i] = size * -sine;
       const float fine = startFine + finePerMm * late;
-      const float whole = std::floor(fine);
+      const float whole = std::floor(std::min(1e9f, std::max(-1e9f, fine))); // lanes beyond the count hold anything
       fraction[i] = fine - whole;
       place[i] = base + static_cast<int>(whole);
     }

@@ -234,14 +234,15 @@ TEST_F(FusedTrackerTest, NormalsOfTheProgramCorrectTheHeading)
 {
   // Neither moves; the program tells the normal at that place.
   PoseStream poses;
-  const auto fused = Make("fused:simulated:?tools=1&rate=100&motion=still|simulated:?tools=1&rate=100&motion=still|"
-                          "mounting=90 0 0&up=0 1 0&alignDegrees=20&alignTo=1 0 0&heldSeconds=0.01&heldDegrees=2");
   const Pose truth = [] {
     SimulatedTrackerParameters p;
     p.motion = SimulatedMotion::Still;
     return SimulatedTruth(p, 0, 0.0);
   }();
   const Vector3d wanted = Vector3d(1, 0.1, 0.3).normalized();
+  const auto fused =
+      Make("fused:simulated:?tools=1&rate=100&motion=still|simulated:?tools=1&rate=100&motion=still|"
+           "mounting=90 0 0&up=0 1 0&alignDegrees=20&alignTo=1 0 0&heldSeconds=0.01&heldDegrees=2"); // ends before these
   fused->SetNormals([&](const Vector3d& place) -> std::optional<Vector3d> {
     if ((place - truth.translation()).norm() > 1e-6)
       return std::nullopt;
