@@ -265,7 +265,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("tree", type=lambda path: pathlib.Path(path).resolve())
     parser.add_argument("-R", dest="regex", help="only tests whose name matches, those inside the GoogleTest programs by theirs (Room.Suite.Test)")
-    parser.add_argument("-j", dest="jobs", type=int, default=os.cpu_count() + 1)  # one in three waits for a window, a device or the clock
+    parser.add_argument("-j", dest="jobs", type=int, default=len(os.sched_getaffinity(0)) + 1)  # many wait for a window, a device or the clock
     parser.add_argument("--without", action="append", default=[], metavar="LABEL")
     parser.add_argument("--counts", type=pathlib.Path, metavar="FILE", help="write the three numbers there, too")
     parser.add_argument("--skips", type=pathlib.Path, default=SOURCE / "Testing" / "expected_skips.txt")
