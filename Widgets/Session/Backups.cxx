@@ -15,6 +15,8 @@
 #include <limits>
 #include <set>
 #include <sys/file.h>
+#include <sys/stat.h>
+#include <tuple>
 #include <unistd.h>
 
 namespace fs = std::filesystem;
@@ -148,6 +150,11 @@ std::vector<Backup> NamedFor(const std::string& project)
   }
   std::stable_sort(backups.begin(), backups.end(), [](const Backup& a, const Backup& b) { return a.time > b.time; });
   return backups;
+}
+
+bool IsBefore(const timespec& one, const timespec& other)
+{
+  return std::tie(one.tv_sec, one.tv_nsec) < std::tie(other.tv_sec, other.tv_nsec);
 }
 
 void Read(Backup& backup)
@@ -290,10 +297,12 @@ std::vector<Backup> Backups::ListFor(const std::string& path)
   return Opened(NamedFor(path));
 }
 
-std::optional<Backup> Backups::NewestFor(const std::string& path, std::int64_t time)
+std::optional<Backup> Backups::NewestFor(const std::string& path, const timespec& saved)
 {
   for (Backup& backup : NamedFor(path)) {
-    if (backup.time < time)
+    struct stat file {};
+    if (backup.time < saved.tv_sec ||
+        (backup.time == saved.tv_sec && stat(backup.path.c_str(), &file) == 0 && IsBefore(file.st_mtim, saved)))
       break;
     echorama::Read(backup);
     if (backup.readable)

@@ -2,6 +2,7 @@
 #pragma once
 #include "Widgets/Session/ProjectFile.h"
 #include <cstdint>
+#include <ctime>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -59,8 +60,9 @@ public:
   static std::string FolderFor(const std::string& path);
   /// All backups of a project, in either folder: the newest first.
   static std::vector<Backup> ListFor(const std::string& path);
-  /// The newest that can be read, when it was made at \a time or later: its label is not told.
-  static std::optional<Backup> NewestFor(const std::string& path, std::int64_t time);
+  /// The newest that can be read, when it was made after the project was last written, \a saved: its label is not told. Their
+  /// names tell seconds; within the same second the times of the files decide.
+  static std::optional<Backup> NewestFor(const std::string& path, const timespec& saved);
   /// Sessions that ended without being saved: their folders, the newest first. Those that still run are not among them.
   static std::vector<std::string> Abandoned();
   /// Takes the backups of \a from over, as the next ones of \a to (a session that was saved for the first time, or recovered);

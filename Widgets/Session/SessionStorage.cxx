@@ -172,7 +172,7 @@ std::string SessionStorage::LaterBackup(const SessionState& state, const std::ve
   if (writer_)
     writer_->Wait();
   try {
-    if (const std::optional<Backup> newest = Backups::NewestFor(path_, saved.st_mtime)) {
+    if (const std::optional<Backup> newest = Backups::NewestFor(path_, saved.st_mtim)) {
       SessionState other = ReadProject(newest->path).state;
       for (SessionVolume& volume : other.volumes) {
         const std::string found = FindVolume(newest->path, volume.file, folders);

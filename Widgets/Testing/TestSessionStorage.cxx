@@ -2,7 +2,9 @@
 #include "Core/Base/Error.h"
 #include "SomeProject.h"
 #include "Widgets/Session/SessionStorage.h"
+#include <chrono>
 #include <cstdlib>
+#include <thread>
 
 using namespace echorama;
 
@@ -103,6 +105,18 @@ TEST_F(SessionOnDisk, ALaterBackupIsOfOtherWork)
   storage.BackUp(Step(2), "later", true);
   EXPECT_EQ(ReadProject(storage.LaterBackup(Step(1).state, {})).state.volumes[0].volumeToWorld.translation().x(), 2.0);
   EXPECT_EQ(storage.LaterBackup(Step(2).state, {}), "");
+}
+
+TEST_F(SessionOnDisk, ABackupOfTheSecondInWhichTheProjectWasSavedIsLaterOnlyWhenItIs)
+{
+  SessionStorage storage;
+  storage.Save(Path("p.json"), Step(1));
+  for (int step = 2; step < 8; step += 2) { // a second may end between the two, but not each time
+    storage.BackUp(Step(step), "earlier", true);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20)); // file systems tell times by ticks
+    storage.Save(Path("p.json"), Step(step + 1));
+    EXPECT_EQ(storage.LaterBackup(Step(step + 1).state, {}), "");
+  }
 }
 
 TEST_F(SessionOnDisk, TroubleIsToldOnce)
