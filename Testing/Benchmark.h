@@ -5,10 +5,11 @@
 #include <chrono>
 #include <cstdlib>
 #include <ctime>
+#include <fstream>
 #include <iostream>
+#include <malloc.h>
 #include <nlohmann/json.hpp>
 #include <string>
-#include <sys/resource.h>
 #include <vector>
 
 namespace echorama::benchmark {
@@ -68,15 +69,41 @@ std::pair<double, double> Duel(const A& a, const B& b, int runs = 5)
   return {first[runs / 2], second[runs / 2]};
 }
 
-/// Largest memory of this process so far, MB.
+/// Largest memory of this process since ForgetPeak(), MB.
 inline double PeakMb()
 {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return usage.ru_maxrss / 1024.0;
+  std::ifstream stream("/proc/self/status");
+  std::string word;
+  double kilobytes = 0.0;
+  while (stream >> word)
+    if (word == "VmHWM:" && stream >> kilobytes)
+      break;
+  return kilobytes / 1024.0;
 }
 
-/// One line of output of what has no error, or whose error another line tells. Further keys are welcome.
+/// From now on the peak is what is there now.
+inline void ForgetPeak()
+{
+  malloc_trim(0);
+  std::ofstream("/proc/self/clear_refs") << "5";
+}
+
+/// The largest memory of this process since it was made, beyond what was there then.
+class MemoryPeak {
+public:
+  MemoryPeak()
+  {
+    ForgetPeak();
+    before_ = PeakMb();
+  }
+  double Beyond() const { return 1048576.0 * (PeakMb() - before_); } ///< bytes
+
+private:
+  double before_ = 0.0;
+};
+
+/// One line of output of what has no error, or whose error another line tells. Further keys are welcome. "peak_mb" is the largest
+/// memory of the process since the line before: input and, where ours and a peer's take turns, both.
 inline void ReportTime(const std::string& bench, const std::string& testCase, const std::string& method, double seconds,
                        const nlohmann::ordered_json& more = {})
 {
@@ -85,6 +112,7 @@ inline void ReportTime(const std::string& bench, const std::string& testCase, co
     line.update(more);
   line["peak_mb"] = PeakMb();
   std::cout << line.dump() << std::endl;
+  ForgetPeak();
   if (Smoke() && std::clock() > 3 * CLOCKS_PER_SEC)
     std::_Exit(0);
 }

@@ -10,6 +10,7 @@ import unittest.mock
 
 SOURCE = pathlib.Path(os.environ["ECHORAMA_SOURCE_DIR"])
 sys.path.insert(0, str(SOURCE / "Testing"))
+import compare_benchmarks
 import report_benchmarks
 
 PAGE = """Before.
@@ -55,6 +56,26 @@ class Reports(unittest.TestCase):
         self.assertTrue(text.startswith("Before.") and text.endswith("After.\n"))
         again = self.table(text)
         self.assertEqual(again.stamp, again.digest())
+
+    def test_memory_gets_a_column_of_its_own_once(self):
+        lines = [{**line, "peak_mb": 1000.0 * (number + 1)} for number, line in enumerate(LINES)]
+        table = self.table(PAGE)
+        once = PAGE[:table.begin] + table.filled(lines, "") + PAGE[table.end:]
+        self.assertIn("| mask | s | ratio | peak, MB |\n| --- | --- | --- | --- |\n| a | 0.50 | 8.0 | 1,000 |\n| b | 0.25 | 4.0 | 3,000 |\n| third | 7 | - | 5,000 |\n", once)
+        table = self.table(once)
+        self.assertEqual(once[:table.begin] + table.filled(lines, "") + once[table.end:], once)
+        telling = self.table(PAGE.replace("{seconds:.0f}", "{peak_mb:.0f}"))  # for itself
+        self.assertIn("| mask | s | ratio |\n| --- | --- | --- |\n| a | 0.50 | 8.0 |\n", telling.filled(lines, ""))
+
+    def test_columns_of_cpus(self):
+        lines = LINES[:2]
+        faster = [{**line, "seconds": line["seconds"] / (2 + number)} for number, line in enumerate(lines)]
+        self.assertEqual(compare_benchmarks.table({"v2": lines, "v3": faster}),
+                         [["case", "method", "v2", "v3"], ["a", "ours", "0.5 s", "0.25 s (2.00)"], ["a", "theirs, old", "4 s", "1.33 s (3.00)"]])
+        with self.assertRaises(SystemExit):
+            compare_benchmarks.table({"v2": lines, "v3": lines[::-1]})
+        with self.assertRaises(SystemExit):
+            compare_benchmarks.table({"v2": lines, "v3": lines[:1]})
 
     def test_what_makes_a_table_old(self):
         with tempfile.TemporaryDirectory() as name, unittest.mock.patch.object(report_benchmarks, "source", pathlib.Path(name)):

@@ -8,11 +8,13 @@ overlap (keys "t" and "within_1mm") become one more panel of success against t. 
 seconds; one with a number of "levels" per line, seconds and error against the levels; lines with an "accuracy" are joined and
 labelled with it; lines with a number of "rays" become curves of error against rays, with their slopes; lines of "energy"
 at times "t" for some numbers of levels two panels of curves, linear and logarithmic; and lines with a "step" for a "viscosity" curves
-of the one against the other, among them the "rule" that foretells it, with what gel has for a "viscosity" at some rates of shear.
+of the one against the other, among them the "rule" that foretells it, with what gel has for a "viscosity" at some rates of shear. Lines with a number of "units" become curves of what one costs ("ns_per_unit"), one
+panel for each case: the flatter the better; the grey band is 20% to either side of the median of the first method's.
 """
 import json
 import math
 import pathlib
+import statistics
 import sys
 
 import matplotlib
@@ -217,6 +219,22 @@ def draw_steps(axes, lines):
     axes.legend(fontsize=8, frameon=False, loc="lower left")
 
 
+def draw_scaling(axes, case, lines):
+    for index, (method, of_method) in enumerate(grouped(lines, "method").items()):
+        units, costs = ([line[key] for line in of_method] for key in ("units", "ns_per_unit"))
+        if index == 0:
+            middle = statistics.median(costs)
+            axes.axhspan(middle / 1.2, middle * 1.2, color="#eeeeee", zorder=0)
+            axes.set_ylim(middle / 4, middle * 4)
+        axes.plot(units, costs, marker=MARKERS[index], color=([OURS] + PEERS)[index], label=method)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlabel(f"{lines[0]['unit']}s")
+    axes.set_ylabel("ns each")
+    axes.set_title(case, fontsize=10)
+    axes.legend(fontsize=8, frameon=False)
+
+
 def main():
     if len(sys.argv) != 3:
         sys.exit("usage: plot_benchmark.py IN.jsonl OUT.png")
@@ -241,6 +259,9 @@ def main():
     def with_rays(of_case):
         return all(number(line, "rays") is not None and number(line, "error") is not None for line in of_case)
 
+    def with_units(of_case):
+        return all(number(line, "units") and number(line, "ns_per_unit") for line in of_case)
+
     def without_errors(of_case):
         return all(number(line, "error") is None for line in of_case)
 
@@ -254,6 +275,8 @@ def main():
             draw_levels(panel, case, of_case)
         elif with_rays(of_case):
             draw_rays(panel, case, of_case)
+        elif with_units(of_case):
+            draw_scaling(panel, case, of_case)
         else:
             draw_bars(panel, case, of_case)
     if success:
@@ -274,7 +297,7 @@ def main():
     if drawn:
         figure.legend(handles=[plt.Line2D([], [], **look[method]) for method in drawn], loc="lower center",
                       ncol=legend_columns, fontsize=9, frameon=False)
-    figure.suptitle(", ".join(dict.fromkeys(str(line.get("bench", "")) for line in lines)), fontsize=12)
+    figure.suptitle(", ".join(dict.fromkeys(str(line.get("bench", "")) for line in lines)), fontsize=12, y=1 - 0.05 / height, va="top")
     out = pathlib.Path(sys.argv[2])
     out.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(out, dpi=110)

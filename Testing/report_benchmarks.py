@@ -16,7 +16,9 @@ become rows; the text in between begins with the head of the table and ends with
 
 Lines with the same values of "by" make one row. In it the keys of the first of them are names, and so is each method, up to the first
 character that is no letter or digit: echorama.seconds. "lines" holds them all, in order. "only: EXPRESSION" leaves lines out. There may
-be several "row"s, each with what was said before it. The number at the end is that of the kernels' contents and their own headers',
+be several "row"s, each with what was said before it. "plot: PICTURE" also draws the lines (plot_benchmark.py) into a file beside the page.
+Where no row tells of memory ("_mb", "bytes") and the lines have a "peak_mb", that of a row's first line is put into a last column of the
+table, which its head gets with it. The number at the end is that of the kernels' contents and their own headers',
 without comments, spaces and the paths of what they include: when it is not theirs any more, a test fails.
 
 What a program printed on a quiet machine is kept beside it, and used again as long as the program and our libraries are the same: a
@@ -31,19 +33,22 @@ import pathlib
 import re
 import subprocess
 import sys
+import tempfile
 import time
 import types
 
 source = pathlib.Path(__file__).resolve().parents[1]
-TABLE = re.compile(r"<!-- bench (?P<names>[\w ]+)\n(?P<spec>.*?)-->\n(?P<head>\|[^\n]*\n\|[^\n]*\n)(?P<rows>.*?)<!-- end bench(?P<stamp> \w+)? -->", re.S)
+TABLE = re.compile(r"<!-- bench (?P<names>[\w ]+)\n(?P<spec>.*?)-->\n(?P<head>\|[^\n]*\n\|[^\n]*\n).*?<!-- end bench(?P<stamp> \w+)? -->", re.S)
+
+PEAK = "peak, MB"
 
 
 class Table:
     def __init__(self, page, match):
         self.page, self.names = page, match["names"].split()
         self.stamp = (match["stamp"] or "").strip()
-        self.begin, self.end = match.start("rows"), match.end()
-        self.kernels, self.rows = [], []
+        self.begin, self.end, self.head = match.start("head"), match.end(), match["head"]
+        self.kernels, self.rows, self.plot = [], [], None
         by, only = ["case"], "True"
         for line in match["spec"].splitlines():
             key, _, value = line.partition(": ")
@@ -55,8 +60,10 @@ class Table:
                 only = value
             elif key == "row":
                 self.rows.append((by, only, value.strip()))
+            elif key == "plot":
+                self.plot = page.parent / value
             else:
-                sys.exit(f"{self}: \"{line}\" is none of kernels, by, only, row")
+                sys.exit(f"{self}: \"{line}\" is none of kernels, by, only, row, plot")
         if not self.kernels or not self.rows:
             sys.exit(f"{self}: it names no kernels, or no row")
 
@@ -75,8 +82,9 @@ class Table:
         return told.hexdigest()[:12]
 
     def filled(self, lines, how):
-        """The rows, the line that says how they were measured, and the end."""
+        """The head, the rows, the line that says how they were measured, and the end."""
         text = ""
+        with_peak = not any("_mb" in row or "bytes" in row for _, _, row in self.rows) and any("peak_mb" in line for line in lines)
         lines = [line for line in lines if "case" in line]  # others are points of curves
         for by, only, row in self.rows:
             groups = {}
@@ -90,10 +98,13 @@ class Table:
                 for line in group:
                     names[re.match(r"\w*", str(line.get("method", "")))[0]] = types.SimpleNamespace(**line)
                 try:
-                    text += "| " + eval("f" + repr(row), {}, names) + " |\n"
+                    text += "| " + eval("f" + repr(row), {}, names) + (f" | {group[0].get('peak_mb', 0):,.0f}" if with_peak else "") + " |\n"
                 except Exception as problem:
                     sys.exit(f"{self}: the row \"{row}\" cannot be made ({problem})")
-        return f"{text}\n*{how}: `./run bench --report {' '.join(self.names)}`*\n<!-- end bench {self.digest()} -->"
+        head = self.head
+        if with_peak and PEAK not in head:
+            head = "".join(line + added for line, added in zip(head.splitlines(), (f" {PEAK} |\n", " --- |\n")))
+        return f"{head}{text}\n*{how}: `./run bench --report {' '.join(self.names)}`*\n<!-- end bench {self.digest()} -->"
 
 
 def tables():
@@ -202,6 +213,11 @@ def main():
         how = "; ".join(dict.fromkeys(results[name]["how"] for name in table.names))
         table.page.write_text(text[:table.begin] + table.filled(lines, how) + text[table.end:])
         print(table, file=sys.stderr)
+        if table.plot:
+            with tempfile.NamedTemporaryFile("w", suffix=".jsonl") as kept:
+                kept.writelines(json.dumps(line) + "\n" for line in lines)
+                kept.flush()
+                subprocess.run([sys.executable, source / "Testing" / "plot_benchmark.py", kept.name, table.plot], check=True)
 
 
 if __name__ == "__main__":

@@ -79,14 +79,14 @@ int main()
     writer.Finish();
     files.Commit();
   }
-  const double before = PeakMb();
+  const MemoryPeak memory;
   double atTheEnd = 0.0;
   const double opening = Seconds([&] {
     const SequenceFile file(poses);
     atTheEnd = file.Frame(99999).time;
   });
   Report("sequence", "header of 100000 frames", "ours", opening, std::fabs(atTheEnd - 99999 / 30.0), "seconds",
-         {{"file_mb", static_cast<double>(fs::file_size(poses)) / 1e6}, {"memory_mb", PeakMb() - before}});
+         {{"file_mb", static_cast<double>(fs::file_size(poses)) / 1e6}, {"memory_mb", memory.Beyond() / 1e6}});
 
   const std::vector<char> pixels = Pixels();
   for (const bool compressed : {true, false}) {

@@ -20,6 +20,7 @@
 #include <igtlServerSocket.h>
 #include <igtlTransformMessage.h>
 #include <set>
+#include <sys/resource.h>
 #include <unistd.h>
 
 using namespace echorama;

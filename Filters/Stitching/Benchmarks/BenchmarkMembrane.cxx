@@ -22,6 +22,7 @@
 #include <functional>
 #include <limits>
 #include <set>
+#include <sys/resource.h>
 #include <tbb/info.h>
 #include <tuple>
 

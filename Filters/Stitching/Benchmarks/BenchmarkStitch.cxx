@@ -17,9 +17,8 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <functional>
-#include <malloc.h>
+#include <sys/resource.h>
 #include <tbb/info.h>
 
 #ifdef ECHORAMA_WITH_VTK
@@ -188,31 +187,6 @@ Case Fans(int count, int size, double step)
                    });
 }
 
-// The largest memory of this process since it was made, beyond what was there then.
-class MemoryPeak {
-public:
-  MemoryPeak()
-  {
-    malloc_trim(0);
-    std::ofstream("/proc/self/clear_refs") << "5"; // the peak is what is there now
-    before_ = Now();
-  }
-  double Bytes() const { return 1024.0 * static_cast<double>(Now() - before_); }
-
-private:
-  static long Now()
-  {
-    std::ifstream stream("/proc/self/status");
-    std::string word;
-    long kilobytes = -1;
-    while (stream >> word)
-      if (word == "VmHWM:" && stream >> kilobytes)
-        break;
-    return kilobytes;
-  }
-  long before_ = 0;
-};
-
 struct Time {
   double wall = 0.0, processor = 0.0;
 };
@@ -269,9 +243,9 @@ void Contest(const Case& scene, const std::string& method, const std::function<R
   Result result;
   double peak = 0.0;
   try {
-    const MemoryPeak memory;
+    const benchmark::MemoryPeak memory;
     result = stitch();
-    peak = memory.Bytes();
+    peak = memory.Beyond();
   } catch (const Error& error) {
     std::cerr << scene.name << ", " << method << ": " << error.what() << "\n";
     return;
