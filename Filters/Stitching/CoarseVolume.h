@@ -8,6 +8,7 @@ namespace echorama {
 /// volumes together and needs no single voxels - gains, seams - is decided there. All boxes are the same.
 struct CoarseVolume {
   Boxed<unsigned char> inside; ///< bit 0: the volume is there
+  Boxed<unsigned char> wanted; ///< 1 where the fields below are looked at (MarkStitchSamples); an empty box: everywhere
   Boxed<float> value;          ///< its voxel there (one sample, not a mean); only where inside
   Boxed<float> low;            ///< its smooth part there (the detail is value - low); only where inside
   Boxed<float> trust;          ///< how far it can be trusted there, (0, 1]; an empty box: all alike

@@ -6,6 +6,7 @@
 #include "Core/Base/Multiversion.h"
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 namespace echorama {
@@ -14,6 +15,9 @@ namespace {
 
 // Binomial filters over the squares: so many that the deviation of a texture is known to some per cent.
 constexpr int deviationRounds = 4;
+
+// A variance that is less, relative to the square of the mean, is rounding: the voxels are floats.
+constexpr double noDeviation = 1e-13;
 
 constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
 
@@ -67,6 +71,25 @@ void Smooth(Volume<float>& volume)
                 [&](std::ptrdiff_t row) { RowSmoother(n[0]).Along(to.Row(static_cast<int>(row), 0), to.SliceStride(), n[2]); });
 }
 
+// Of where the volume is (bit 0), what it shares.
+ECHORAMA_HOT void KeepShared(const unsigned char* coverage, int count, unsigned char* inside)
+{
+  for (int i = 0; i < count; ++i)
+    inside[i] &= coverage[i] > 1 ? 1 : 0;
+}
+
+// Adds a row of voxels to the sums of its columns, in double: the mean of equal floats is that float.
+ECHORAMA_HOT void AddColumns(const float* value, const unsigned char* inside, int count, double* __restrict sum,
+                             double* __restrict square, double* __restrict counted)
+{
+  for (int i = 0; i < count; ++i) {
+    const double here = inside[i] != 0 ? 1.0 : 0.0, own = static_cast<double>(inside[i] != 0 ? value[i] : 0.0f);
+    sum[i] += own;
+    square[i] += own * own;
+    counted[i] += here;
+  }
+}
+
 } // namespace
 
 BlockLattice BlocksOf(const ImageGeometry& grid, double scale)
@@ -103,19 +126,17 @@ SmoothPart LowPass(const StitchSampler& volume, const BlockLattice& blocks, Volu
   part.deviation = low;
   const std::ptrdiff_t rows = static_cast<std::ptrdiff_t>(low.box.size[1]) * low.box.size[2];
   ParallelRanges(rows, 1, progress, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-    const std::size_t count = static_cast<std::size_t>(own.size[0]), across = static_cast<std::size_t>(low.box.size[0]);
+    const std::size_t count = static_cast<std::size_t>(own.size[0]);
     std::vector<unsigned char> inside(count);
     std::vector<float> values(count);
-    std::vector<double> sums(across), squares(across), bases(across);
-    std::vector<int> counts(across), blockOf(count);
-    for (int i = 0; i < own.size[0]; ++i)
-      blockOf[static_cast<std::size_t>(i)] = (own.first[0] + i) / blocks.size[0] - low.box.first[0];
+    std::vector<double> sums(count), squares(count), counts(count); // of the columns of a row of blocks
     for (std::ptrdiff_t row = begin; row < end; ++row) {
       const int bj = low.box.first[1] + static_cast<int>(row % low.box.size[1]);
       const int bk = low.box.first[2] + static_cast<int>(row / low.box.size[1]);
       std::fill(sums.begin(), sums.end(), 0.0);
       std::fill(squares.begin(), squares.end(), 0.0);
-      std::fill(counts.begin(), counts.end(), 0);
+      std::fill(counts.begin(), counts.end(), 0.0);
+      bool any = false;
       const auto last = [&](int block, int axis) {
         return std::min((block + 1) * blocks.size[axis], own.first[axis] + own.size[axis]);
       };
@@ -123,42 +144,38 @@ SmoothPart LowPass(const StitchSampler& volume, const BlockLattice& blocks, Volu
         for (int j = std::max(bj * blocks.size[1], own.first[1]); j < last(bj, 1); ++j) {
           const unsigned char* covered =
               coverage.Row(std::min(j / step, coverage.Dimensions()[1] - 1), std::min(k / step, coverage.Dimensions()[2] - 1));
-          const auto shared = [&](int i) {
-            return covered[step == 1 ? i : std::min(i / step, coverage.Dimensions()[0] - 1)] > 1;
-          };
-          int from = 0, to = own.size[0];
-          while (from < to && !shared(own.first[0] + from))
-            ++from;
-          while (to > from && !shared(own.first[0] + to - 1))
-            --to;
-          if (from == to)
-            continue;
           if (mask)
             std::copy_n(mask->Row(j, k), count, inside.begin());
           else
             volume.Inside(j, k, inside.data());
-          for (int i = 0; i < own.size[0]; ++i)
-            inside[i] = static_cast<unsigned char>(inside[i] & 1 & (i >= from && i < to && shared(own.first[0] + i)));
+          if (step == 1)
+            KeepShared(covered + own.first[0], own.size[0], inside.data());
+          else
+            for (int i = 0; i < own.size[0]; ++i)
+              inside[i] &= covered[std::min((own.first[0] + i) / step, coverage.Dimensions()[0] - 1)] > 1;
+          if (!std::memchr(inside.data(), 1, count))
+            continue;
+          any = true;
           volume.Values(j, k, inside.data(), values.data());
-          for (int i = from; i < to; ++i) {
-            if (!inside[i])
-              continue;
-            const int b = blockOf[static_cast<std::size_t>(i)];
-            // Differences from the first: the mean of equal values is that value.
-            if (counts[b]++ == 0)
-              bases[b] = static_cast<double>(values[i]);
-            const double above = static_cast<double>(values[i]) - bases[b];
-            sums[b] += above;
-            squares[b] += above * above;
-          }
+          AddColumns(values.data(), inside.data(), own.size[0], sums.data(), squares.data(), counts.data());
         }
+      if (!any)
+        continue;
       float *const mean = low.Row(bj, bk), *const square = part.deviation.Row(bj, bk);
-      for (std::size_t b = 0; b < across; ++b)
-        if (counts[b] > 0) {
-          const double above = sums[b] / counts[b];
-          mean[b] = static_cast<float>(bases[b] + above);
-          square[b] = static_cast<float>(std::max(0.0, squares[b] / counts[b] - above * above));
+      for (int b = 0; b < low.box.size[0]; ++b) {
+        const int block = low.box.first[0] + b;
+        double sum = 0.0, ofSquares = 0.0, voxels = 0.0;
+        for (int i = std::max(block * blocks.size[0], own.first[0]) - own.first[0]; i < last(block, 0) - own.first[0]; ++i) {
+          sum += sums[i];
+          ofSquares += squares[i];
+          voxels += counts[i];
         }
+        if (voxels > 0.0) {
+          const double average = sum / voxels, variance = ofSquares / voxels - average * average;
+          mean[b] = static_cast<float>(average);
+          square[b] = static_cast<float>(variance > noDeviation * average * average ? variance : 0.0);
+        }
+      }
     }
   });
   const Volume<float> means = low.values;

@@ -16,37 +16,21 @@ public:
 
   int Count() const { return static_cast<int>(first_.size()); }
 
-  /// For the piece that (i, j, k), a voxel of the overlap, belongs to: the other one when \a volume is one of only two
-  /// that are in it or touch it, -1 when there are more (or both claim the same core).
-  class Row {
-  public:
-    /// Asked for ascending i only.
-    int PartnerOf(int volume, int i)
-    {
-      while (run_ != end_ && i >= run_->end)
-        ++run_;
-      return run_ == end_ ? -1 : owner_->Partner(run_->piece, volume);
-    }
-
-  private:
-    friend class OverlapComponents;
-    struct Run {
-      int begin, end, piece;
-    };
-    const OverlapComponents* owner_ = nullptr;
-    const Run *run_ = nullptr, *end_ = nullptr;
-  };
-  Row RowAt(int j, int k) const
+  /// Runs body(begin, end, partner) for the runs of overlap voxels [begin, end) of a row, from left to right. The partner is the
+  /// other volume when \a volume is one of only two that are in the piece or touch it, -1 when there are more (or both claim
+  /// the same core).
+  template <class Body>
+  void ForRuns(int volume, int j, int k, const Body& body) const
   {
-    Row row;
-    row.owner_ = this;
-    const std::size_t number = static_cast<std::size_t>(k) * static_cast<std::size_t>(rows_) + static_cast<std::size_t>(j);
-    row.run_ = runs_.data() + starts_[number];
-    row.end_ = runs_.data() + starts_[number + 1];
-    return row;
+    const std::size_t row = static_cast<std::size_t>(k) * static_cast<std::size_t>(rows_) + static_cast<std::size_t>(j);
+    for (std::size_t run = starts_[row]; run < starts_[row + 1]; ++run)
+      body(runs_[run].begin, runs_[run].end, Partner(runs_[run].piece, volume));
   }
 
 private:
+  struct Run {
+    int begin, end, piece;
+  };
   int Partner(int piece, int volume) const
   {
     if (many_[piece])
@@ -54,7 +38,7 @@ private:
     return first_[piece] == volume ? second_[piece] : first_[piece];
   }
   int rows_ = 0; // of one slice
-  std::vector<Row::Run> runs_;
+  std::vector<Run> runs_;
   std::vector<std::size_t> starts_; // per row, and the whole at the end
   std::vector<int> first_, second_; // per piece, the volumes that meet; -1: none
   std::vector<char> many_;          // per piece

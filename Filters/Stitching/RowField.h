@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "GridBox.h"
+#include "ZeroedMemory.h"
 #include <memory>
 #include <vector>
 
@@ -37,15 +38,15 @@ private:
   std::vector<std::ptrdiff_t> start_; // per row, and the whole at the end
 };
 
-/// Values of the voxels of spans.
+/// Values of the voxels of spans; they begin with zeros.
 template <class T>
 struct RowField {
   std::shared_ptr<const RowSpans> spans;
-  std::vector<T> values;
+  Zeroed<T> values;
 
   RowField() = default;
-  explicit RowField(std::shared_ptr<const RowSpans> where, T value = T())
-    : spans(std::move(where)), values(static_cast<std::size_t>(spans->Count()), value)
+  explicit RowField(std::shared_ptr<const RowSpans> where)
+    : spans(std::move(where)), values(static_cast<std::size_t>(spans->Count()))
   {
   }
   /// The span of a row, or nullptr where it is empty; Row(j, k)[i - spans->First(j, k)] belongs to (i, j, k).

@@ -3,6 +3,7 @@
 #include "Core/Imaging/DisplacementField.h"
 #include "Core/Imaging/Sampling.h"
 #include "RegionMap.h"
+#include <type_traits>
 
 namespace echorama {
 
@@ -30,13 +31,22 @@ public:
   template <class A>
   void Values(int j, int k, const unsigned char* inside, A* values) const;
 
+  /// Inside and Values in one go, which costs hardly more than the latter.
+  template <class A>
+  void Read(int j, int k, unsigned char* inside, A* values) const;
+
 private:
   struct Line;
   Line LineAt(int j, int k) const;
+  void Narrow(double margin, Line& line) const;
+  template <bool Finds, class A>
+  void Row(int j, int k, std::conditional_t<Finds, unsigned char, const unsigned char>* inside, A* values) const;
+  template <class A>
+  void Chunk(const Line& line, int first, int count, A* values, unsigned char* real) const;
   std::vector<Eigen::Vector3d> DisplacedRow(int j, int k) const;
 
   VolumeView<const T> intensity_;
-  VolumeView<const unsigned char> valid_;
+  VolumeView<const unsigned char> valid_; ///< empty when it masks nothing
   Sampler<T> sampler_;
   const DisplacementField* displacement_; ///< nullptr: none, or zero everywhere
   Eigen::Affine3d gridToWorld_, worldToIndex_, gridToIndex_;

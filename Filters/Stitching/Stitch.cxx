@@ -14,12 +14,14 @@
 #include "Core/Imaging/VoxelTypes.h"
 #include "LowPass.h"
 #include "RegionMap.h"
+#include "SmoothRows.h"
 #include "StitchGain.h"
 #include "StitchMemory.h"
 #include "StitchSampler.h"
 #include "StitchScales.h"
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 namespace echorama {
@@ -146,7 +148,7 @@ struct StitchPlan::Parts {
     return CoarseSampler(RowSampler<float>(blockwise, where));
   }
   void FindScales(const Progress& progress);
-  std::vector<CoarseVolume> CoarseVolumes(const ImageGeometry& coarse, int step) const;
+  std::vector<CoarseVolume> CoarseVolumes(const ImageGeometry& coarse) const;
   void FindWhatIsCoarse(const Progress& progress);
   void ScaleRow(int volume, int j, int k, int first, int end, const unsigned char* wanted, float* scale) const;
   template <class T>
@@ -231,56 +233,37 @@ void StitchPlan::Parts::FindScales(const Progress& progress)
     scaleSamplers.emplace_back(field.values, field.known, planGrid, grid);
 }
 
-// All volumes on a coarse copy of the grid, every step-th voxel of it.
-std::vector<CoarseVolume> StitchPlan::Parts::CoarseVolumes(const ImageGeometry& coarse, int step) const
+// All volumes on a coarse copy of the grid, where gains and correlations are to be found.
+std::vector<CoarseVolume> StitchPlan::Parts::CoarseVolumes(const ImageGeometry& coarse) const
 {
   std::vector<CoarseVolume> volumes(inputs.size());
-  Volume<unsigned char> coverage(coarse.dimensions);
+  std::vector<StitchSampler> coarser;
+  for (const StitchInput& input : inputs)
+    coarser.emplace_back(input, coarse, parameters.reliabilityFloor);
+  for (std::size_t v = 0; v < inputs.size(); ++v) {
+    volumes[v].inside = {coarser[v].Box(), Volume<unsigned char>(coarser[v].Box().size)};
+    ForRows(coarser[v].Box(), Progress(), [&](int j, int k) { coarser[v].Inside(j, k, volumes[v].inside.Row(j, k)); });
+  }
+  MarkStitchSamples(volumes);
   for (std::size_t v = 0; v < inputs.size(); ++v) {
     CoarseVolume& volume = volumes[v];
-    const StitchSampler sampler(inputs[v], coarse, parameters.reliabilityFloor);
-    const GridBox box = sampler.Box();
-    volume.inside = {box, Volume<unsigned char>(box.size)};
+    const GridBox& box = volume.inside.box;
     volume.value = {box, Volume<float>(box.size)};
     volume.low = {box, Volume<float>(box.size)};
-    if (sampler.HasTrust())
+    if (coarser[v].HasTrust())
       volume.trust = {box, Volume<float>(box.size)};
     const CoarseSampler low = BlockSampler(lows[v].low, coarse);
     ForRows(box, Progress(), [&](int j, int k) {
-      unsigned char* inside = volume.inside.Row(j, k);
-      sampler.Inside(j, k, inside);
-      sampler.Values(j, k, inside, volume.value.Row(j, k));
+      const unsigned char* wanted = volume.wanted.Row(j, k);
+      float* const value = volume.value.Row(j, k);
+      float* const smooth = volume.low.Row(j, k);
+      coarser[v].Values(j, k, wanted, value);
+      low.Row(j, k, box.first[0], box.first[0] + box.size[0], wanted, noValue, smooth);
       // Outside of the overlap there is no smooth part, and no use for one.
-      low.Row(j, k, box.first[0], box.first[0] + box.size[0], inside, noValue, volume.low.Row(j, k));
       for (int i = 0; i < box.size[0]; ++i)
-        if (std::isnan(volume.low.Row(j, k)[i]))
-          volume.low.Row(j, k)[i] = volume.value.Row(j, k)[i];
-      if (sampler.HasTrust())
-        sampler.Trust(j, k, inside, volume.trust.Row(j, k));
-      unsigned char* covered = coverage.View().Row(j, k) + box.first[0];
-      for (int i = 0; i < box.size[0]; ++i)
-        covered[i] = static_cast<unsigned char>(covered[i] + (inside[i] & (covered[i] < 255)));
-    });
-  }
-  if (scales.empty() && scaleSamplers.empty())
-    return volumes;
-  const auto& n = grid.dimensions;
-  const bool depths = parameters.method == StitchMethod::Feather; // in mm: 1 says nothing of being alone
-  const auto bounded = [depths](float scale) { return depths ? scale / (scale + 1.0f) : scale; };
-  const std::array<int, 3> start{CoarseStart(n[0], step), CoarseStart(n[1], step), CoarseStart(n[2], step)};
-  for (std::size_t v = 0; v < inputs.size(); ++v) {
-    CoarseVolume& volume = volumes[v];
-    const GridBox box = volume.inside.box;
-    volume.scale = {box, Volume<float>(box.size)};
-    ForRows(box, Progress(), [&](int j, int k) {
-      const int first = start[0] + step * box.first[0], end = std::min(n[0], first + step * box.size[0]);
-      std::vector<float> row(static_cast<std::size_t>(end - first), 1.0f);
-      const std::vector<unsigned char> wanted(row.size(), 1);
-      ScaleRow(static_cast<int>(v), start[1] + step * j, start[2] + step * k, first, end, wanted.data(), row.data());
-      const unsigned char *covered = coverage.View().Row(j, k) + box.first[0], *inside = volume.inside.Row(j, k);
-      float* scale = volume.scale.Row(j, k);
-      for (int i = 0; i < box.size[0]; ++i)
-        scale[i] = !(inside[i] & 1) ? 0.0f : covered[i] == 1 ? 1.0f : bounded(row[static_cast<std::size_t>(step) * i]);
+        smooth[i] = std::isnan(smooth[i]) ? value[i] : smooth[i];
+      if (coarser[v].HasTrust())
+        coarser[v].Trust(j, k, wanted, volume.trust.Row(j, k));
     });
   }
   return volumes;
@@ -295,8 +278,7 @@ void StitchPlan::Parts::FindWhatIsCoarse(const Progress& progress)
   int step = factor;
   while (static_cast<double>(Coarsened(grid, step).VoxelCount()) > coarseVoxels)
     ++step;
-  const ImageGeometry coarse = Coarsened(grid, step);
-  std::vector<CoarseVolume> volumes = CoarseVolumes(coarse, step);
+  const std::vector<CoarseVolume> volumes = CoarseVolumes(Coarsened(grid, step));
   progress(0.5);
   gains = EstimateStitchGains(volumes, parameters.equalizeGain);
   for (std::size_t v = 0; v < inputs.size(); ++v) {
@@ -353,7 +335,8 @@ const std::vector<double>& StitchPlan::Offset() const
   return parts_->gains.offset;
 }
 
-// The rows of one task: buffers, and how a row is made.
+// The rows of one task: buffers, and how a row is made. Where several volumes are, a row falls into runs with the same volumes
+// at all their voxels, and each is blended as a whole.
 template <class T>
 class StitchPlan::Parts::RowBlender {
   using A = Accumulator<T>;
@@ -365,51 +348,50 @@ public:
                  ? parts.parameters.sharpness
              : parts.parameters.method == StitchMethod::Feather ? 1.0
                                                                 : 0.0),
-      detailPower_(parts.parameters.detailSharpness), count_(static_cast<std::size_t>(box.size[0])), here_(parts.inputs.size()),
-      voxel_(parts.inputs.size())
+      detailPower_(parts.parameters.detailSharpness), width_(static_cast<std::size_t>(box.size[0])), changes_(width_ + 1),
+      shown_(width_), sum_(width_), scratch_(2 * width_), values_(layers_.size()), lows_(layers_.size()), scales_(layers_.size()),
+      weights_(layers_.size()), shares_(layers_.size()), trusts_(layers_.size()), deviations_(layers_.size())
   {
-    const std::size_t n = parts.inputs.size();
-    correlation_.assign(n * n, 0.0f);
-    for (std::size_t a = 0; a < n; ++a)
-      for (std::size_t b = 0; b < n; ++b)
-        correlation_[a * n + b] =
-            parts.gains.detailCorrelation.size() ? static_cast<float>(parts.gains.detailCorrelation(a, b)) : 0.0f;
+    for (std::size_t v = 0; v < layers_.size() && parts.textured; ++v) {
+      layers_[v].lows = std::make_unique<SmoothRows<A>>(parts.blocks, parts.lows[v].low);
+      layers_[v].deviations = std::make_unique<SmoothRows<float>>(parts.blocks, parts.lows[v].deviation);
+    }
   }
 
   void Row(int j, int k)
   {
-    const int y = j - box_.first[1], z = k - box_.first[2];
-    Sample(j, k);
-    T* result = output_.intensity.Row(y, z);
-    unsigned char *valid = output_.valid.Row(y, z), *coverage = output_.coverage.Row(y, z);
-    float* spread = output_.spread.Empty() ? nullptr : output_.spread.Row(y, z);
+    const int y = j - box_.first[1], z = k - box_.first[2], n = box_.size[0];
+    unsigned char* const coverage = output_.coverage.Row(y, z);
+    Sample(j, k, coverage);
     for (std::size_t v = 0; v < output_.weights.size(); ++v)
-      std::fill_n(output_.weights[v].Row(y, z), box_.size[0], 0.0f);
-    bool overlap = false;
-    for (int i = 0; i < box_.size[0]; ++i) {
-      result[i] = T(0);
-      valid[i] = count_[i] > 0;
-      coverage[i] = static_cast<unsigned char>(std::min<int>(count_[i], 255));
-      overlap = overlap || count_[i] > 1;
-      if (spread)
-        spread[i] = 0.0f;
-    }
+      std::fill_n(output_.weights[v].Row(y, z), n, 0.0f);
+    if (!output_.spread.Empty())
+      std::fill_n(output_.spread.Row(y, z), n, 0.0f);
+    std::fill(shown_.begin(), shown_.end(), A(0));
     for (const int v : rows_) {
       const Layer& layer = layers_[v];
-      float* weight = output_.weights.empty() ? nullptr : output_.weights[v].Row(y, z);
-      const A gain = static_cast<A>(parts_.gains.gain[v]), offset = static_cast<A>(parts_.gains.offset[v]);
-      for (int i = layer.first; i < layer.end; ++i)
-        if (count_[i] == 1 && (layer.Inside(i) & 1)) {
-          result[i] = RoundedVoxel<T>(gain * layer.values[i - layer.start] + offset);
-          if (weight)
-            weight[i] = 1.0f;
-        }
+      ShowAlone(layer.Value(layer.first), layer.Inside(layer.first), coverage + layer.first, static_cast<A>(parts_.gains.gain[v]),
+                static_cast<A>(parts_.gains.offset[v]), static_cast<std::size_t>(layer.end - layer.first),
+                shown_.data() + layer.first);
+      for (int i = layer.first; i < layer.end && !output_.weights.empty(); ++i)
+        if (coverage[i] == 1 && (*layer.Inside(i) & 1))
+          output_.weights[v].Row(y, z)[i] = 1.0f;
     }
-    if (overlap) {
-      SampleOverlap(j, k);
-      for (int i = 0; i < box_.size[0]; ++i)
-        if (count_[i] > 1)
-          result[i] = RoundedVoxel<T>(Blend(i, y, z, spread));
+    if (std::any_of(coverage, coverage + n, [](unsigned char count) { return count > 1; })) {
+      SampleOverlap(j, k, coverage);
+      for (int i = 0, end = 0; i < n; i = end) {
+        end = static_cast<int>(
+            static_cast<const unsigned char*>(std::memchr(&changes_[static_cast<std::size_t>(i) + 1], 1, width_ - i)) -
+            changes_.data());
+        if (coverage[i] > 1)
+          Blend(i, end, y, z);
+      }
+    }
+    unsigned char* const valid = output_.valid.Row(y, z);
+    T* const result = output_.intensity.Row(y, z);
+    for (int i = 0; i < n; ++i) {
+      valid[i] = coverage[i] > 0;
+      result[i] = RoundedVoxel<T>(shown_[i]);
     }
   }
 
@@ -418,26 +400,25 @@ private:
   struct Layer {
     int start = 0, first = 0, end = 0;
     std::vector<unsigned char> inside;
-    std::vector<A> values, low;
-    std::vector<float> trust, scale, deviation;
-    std::vector<unsigned char> shared; // of the box that is made: 1 where it meets others
-    unsigned char Inside(int i) const { return inside[static_cast<std::size_t>(i - start)]; }
-  };
-  // A volume at one voxel.
-  struct Here {
-    int volume;
-    A value, low;
-    float deviation; // of the details around here
-  };
-  struct Voxel {
-    explicit Voxel(std::size_t n) : scale(n), trust(n), weight(n), detail(n) {}
-    std::vector<float> scale, trust, weight, detail;
+    std::vector<A> values;
+    std::vector<float> trust;
+    // Where it meets others, of the box that is made:
+    std::vector<unsigned char> shared; // whether it does
+    std::vector<A> shown, low;         // with the gain
+    std::vector<float> scale, deviation, weight, share;
+    std::unique_ptr<SmoothRows<A>> lows;
+    std::unique_ptr<SmoothRows<float>> deviations;
+    const unsigned char* Inside(int i) const { return inside.data() + (i - start); }
+    const A* Value(int i) const { return values.data() + (i - start); }
   };
 
-  void Sample(int j, int k)
+  // Values and coverage of the row, and where the volumes that are there change.
+  void Sample(int j, int k, unsigned char* coverage)
   {
     rows_.clear();
-    std::fill(count_.begin(), count_.end(), 0);
+    std::fill_n(coverage, width_, static_cast<unsigned char>(0));
+    std::fill(changes_.begin(), changes_.end(), static_cast<unsigned char>(0));
+    changes_.back() = 1;
     for (int v = 0; v < static_cast<int>(layers_.size()); ++v) {
       const StitchSampler& sampler = parts_.samplers[v];
       const GridBox& own = sampler.Box();
@@ -452,120 +433,145 @@ private:
       rows_.push_back(v);
       layer.inside.resize(static_cast<std::size_t>(own.size[0]));
       layer.values.resize(static_cast<std::size_t>(own.size[0]));
-      sampler.Inside(j, k, layer.inside.data());
-      sampler.Values(j, k, layer.inside.data(), layer.values.data());
+      sampler.Read(j, k, layer.inside.data(), layer.values.data());
+      const unsigned char* const inside = layer.inside.data() - layer.start;
       for (int i = layer.first; i < layer.end; ++i)
-        count_[i] += layer.Inside(i) & 1;
+        coverage[i] = static_cast<unsigned char>(coverage[i] + (inside[i] & 1 & (coverage[i] < 255)));
+      changes_[static_cast<std::size_t>(layer.first)] = changes_[static_cast<std::size_t>(layer.end)] = 1;
+      for (int i = layer.first + 1; i < layer.end; ++i)
+        changes_[static_cast<std::size_t>(i)] |= (inside[i] ^ inside[i - 1]) & 1;
     }
   }
 
-  void SampleOverlap(int j, int k)
+  void SampleOverlap(int j, int k, const unsigned char* coverage)
   {
-    const int n = box_.size[0], first = box_.first[0];
+    const int n = box_.size[0];
     for (const int v : rows_) {
       Layer& layer = layers_[v];
-      layer.shared.assign(static_cast<std::size_t>(n), 0);
+      layer.shared.assign(width_, 0);
+      const unsigned char* const inside = layer.inside.data() - layer.start;
       for (int i = layer.first; i < layer.end; ++i)
-        layer.shared[i] = (layer.Inside(i) & 1) & (count_[i] > 1);
-      layer.scale.assign(static_cast<std::size_t>(n), 1.0f);
+        layer.shared[i] = (inside[i] & 1) & (coverage[i] > 1);
+      int first = layer.first, end = layer.end; // where it meets others
+      while (first < end && !layer.shared[first])
+        ++first;
+      while (first < end && !layer.shared[end - 1])
+        --end;
+      if (first == end)
+        continue;
+      const std::size_t count = static_cast<std::size_t>(end - first);
+      const A gain = static_cast<A>(parts_.gains.gain[v]), offset = static_cast<A>(parts_.gains.offset[v]);
+      layer.shown.resize(width_);
+      layer.weight.resize(width_);
+      ApplyGain(layer.Value(first), gain, offset, count, layer.shown.data() + first);
+      layer.scale.assign(width_, 1.0f);
       if (!parts_.scales.empty() || !parts_.scaleSamplers.empty())
-        parts_.ScaleRow(v, j, k, first, first + n, layer.shared.data(), layer.scale.data());
+        parts_.ScaleRow(v, j, k, box_.first[0], box_.first[0] + n, layer.shared.data(), layer.scale.data());
       if (parts_.samplers[v].HasTrust()) {
         layer.trust.resize(layer.inside.size());
         parts_.samplers[v].Trust(j, k, layer.inside.data(), layer.trust.data());
       }
-      if (parts_.textured) {
-        layer.low.resize(static_cast<std::size_t>(n));
-        layer.deviation.resize(static_cast<std::size_t>(n));
-        parts_.lowSamplers[v].Row(j, k, first, first + n, layer.shared.data(), noValue, layer.low.data());
-        parts_.deviationSamplers[v].Row(j, k, first, first + n, layer.shared.data(), 0.0f, layer.deviation.data());
-      }
+      if (!parts_.textured)
+        continue;
+      layer.share.resize(width_);
+      layer.low.resize(width_);
+      layer.deviation.resize(width_);
+      A* const low = layer.low.data();
+      float* const deviation = layer.deviation.data();
+      const int x = box_.first[0];
+      const unsigned char* const wanted = layer.shared.data();
+      if (!layer.lows->Row(j, k, x + first, x + end, wanted + first, low + first))
+        parts_.lowSamplers[v].Row(j, k, x, x + n, wanted, noValue, low);
+      if (!layer.deviations->Row(j, k, x + first, x + end, wanted + first, deviation + first))
+        parts_.deviationSamplers[v].Row(j, k, x, x + n, wanted, 0.0f, deviation);
+      ApplyGain(low + first, gain, offset, count, low + first);
+      ApplyGain(deviation + first, static_cast<float>(gain), 0.0f, count, deviation + first);
+      for (int i = first; i < end; ++i) // without a smooth part (an overlap thinner than the plan's voxels) all is smooth
+        low[i] = std::isnan(low[i]) ? layer.shown[i] : low[i];
     }
   }
 
-  A Blend(int i, int y, int z, float* spread)
+  // A run of voxels at which the same volumes are.
+  void Blend(int first, int end, int y, int z)
   {
-    std::size_t n = 0;
+    const std::size_t count = static_cast<std::size_t>(end - first);
+    here_.clear();
+    for (const int v : rows_)
+      if (first >= layers_[v].first && first < layers_[v].end && layers_[v].shared[first])
+        here_.push_back(v);
+    const std::size_t n = here_.size();
     bool trusted = false;
-    for (const int v : rows_) {
-      const Layer& layer = layers_[v];
-      if (!layer.shared[i])
-        continue;
-      const A gain = static_cast<A>(parts_.gains.gain[v]), offset = static_cast<A>(parts_.gains.offset[v]);
-      here_[n] = {v, gain * layer.values[i - layer.start] + offset, A(0), 0.0f};
-      if (parts_.textured) // without a smooth part (an overlap thinner than the plan's voxels) the voxel is taken as smooth
-        here_[n].low = std::isnan(layer.low[i]) ? here_[n].value : gain * layer.low[i] + offset;
-      if (parts_.textured)
-        here_[n].deviation = static_cast<float>(gain) * layer.deviation[i];
-      voxel_.scale[n] = layer.scale[i];
-      const bool trust = parts_.samplers[v].HasTrust();
-      voxel_.trust[n] = trust ? layer.trust[i - layer.start] : 1.0f;
+    for (std::size_t a = 0; a < n; ++a) {
+      Layer& layer = layers_[here_[a]];
+      const bool trust = parts_.samplers[here_[a]].HasTrust();
       trusted = trusted || trust;
-      ++n;
+      values_[a] = layer.shown.data() + first;
+      scales_[a] = layer.scale.data() + first;
+      trusts_[a] = trust ? layer.trust.data() + (first - layer.start) : nullptr;
+      weights_[a] = layer.weight.data() + first;
     }
-    Weigh(n, trusted);
-    if (spread) {
-      A least = here_[0].value, most = least;
+    Weigh(n, count, trusted);
+    for (std::size_t a = 0; a < n && !output_.weights.empty(); ++a)
+      std::copy_n(weights_[a], count, output_.weights[here_[a]].Row(y, z) + first);
+    if (!output_.spread.Empty())
+      Spread(n, count, output_.spread.Row(y, z) + first);
+    BlendRow<A> row;
+    row.volumes = n;
+    row.count = count;
+    row.value = values_.data();
+    row.weight = weights_.data();
+    if (!parts_.textured) {
+      BlendMean(row, shown_.data() + first);
+      return;
+    }
+    correlation_.resize(n * n);
+    for (std::size_t a = 0; a < n; ++a) {
+      Layer& layer = layers_[here_[a]];
+      lows_[a] = layer.low.data() + first;
+      deviations_[a] = layer.deviation.data() + first;
+      shares_[a] = layer.share.data() + first;
+      for (std::size_t i = 0; i < count && trusts_[a]; ++i)
+        scales_[a][i] *= trusts_[a][i];
+      for (std::size_t b = 0; b < n; ++b)
+        correlation_[a * n + b] = static_cast<float>(parts_.gains.detailCorrelation(here_[a], here_[b]));
+    }
+    BlendWeights(scales_.data(), nullptr, n, count, detailPower_, shares_.data(), scratch_.data());
+    row.low = lows_.data();
+    row.share = shares_.data();
+    row.deviation = deviations_.data();
+    row.correlation = correlation_.data();
+    row.mostAmplified = mostAmplified;
+    row.scratch = scratch_.data();
+    BlendSplit(row, sum_.data(), shown_.data() + first);
+  }
+
+  // The weights of the run's volumes, from their scales and how far they can be trusted.
+  void Weigh(std::size_t n, std::size_t count, bool trusted)
+  {
+    if (parts_.parameters.method != StitchMethod::Maximum) {
+      BlendWeights(scales_.data(), trusted ? trusts_.data() : nullptr, n, count, power_, weights_.data(), scratch_.data());
+      return;
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      std::size_t largest = 0;
+      for (std::size_t a = 1; a < n; ++a)
+        if (values_[a][i] > values_[largest][i])
+          largest = a;
+      for (std::size_t a = 0; a < n; ++a)
+        weights_[a][i] = a == largest;
+    }
+  }
+
+  void Spread(std::size_t n, std::size_t count, float* spread) const
+  {
+    for (std::size_t i = 0; i < count; ++i) {
+      A least = values_[0][i], most = least;
       for (std::size_t a = 1; a < n; ++a) {
-        least = std::min(least, here_[a].value);
-        most = std::max(most, here_[a].value);
+        least = std::min(least, values_[a][i]);
+        most = std::max(most, values_[a][i]);
       }
       spread[i] = static_cast<float>(most - least);
     }
-    for (std::size_t a = 0; a < n && !output_.weights.empty(); ++a)
-      output_.weights[here_[a].volume].Row(y, z)[i] = voxel_.weight[a];
-    if (!parts_.textured) {
-      A mean = here_[0].value;
-      for (std::size_t a = 1; a < n; ++a)
-        mean += static_cast<A>(voxel_.weight[a]) * (here_[a].value - here_[0].value);
-      return mean;
-    }
-    A smooth = here_[0].low;
-    for (std::size_t a = 1; a < n; ++a)
-      smooth += static_cast<A>(voxel_.weight[a]) * (here_[a].low - here_[0].low);
-    return smooth + Detail(n);
-  }
-
-  // The weights of the voxel's volumes, from their scales and how far they can be trusted.
-  void Weigh(std::size_t n, bool trusted)
-  {
-    const float* trust = trusted ? voxel_.trust.data() : nullptr;
-    if (parts_.parameters.method != StitchMethod::Maximum) {
-      BlendWeights(voxel_.scale.data(), trust, n, power_, voxel_.weight.data());
-      return;
-    }
-    std::size_t largest = 0;
-    for (std::size_t a = 1; a < n; ++a)
-      if (here_[a].value > here_[largest].value)
-        largest = a;
-    for (std::size_t a = 0; a < n; ++a)
-      voxel_.weight[a] = a == largest;
-  }
-
-  // The blend of the details, with the variance that they would have one by one.
-  A Detail(std::size_t n)
-  {
-    float* h = voxel_.detail.data();
-    for (std::size_t a = 0; a < n; ++a)
-      voxel_.scale[a] *= voxel_.trust[a];
-    BlendWeights(voxel_.scale.data(), nullptr, n, detailPower_, h);
-    // Details change over as narrowly as their weights, how strong they are as widely as the smooth part does: a texture that
-    // ends abruptly at a stronger one is a seam as well.
-    float strength = here_[0].deviation;
-    for (std::size_t a = 1; a < n; ++a)
-      strength += voxel_.weight[a] * (here_[a].deviation - here_[0].deviation);
-    A sum = 0;
-    float variance = 0.0f;
-    for (std::size_t a = 0; a < n; ++a) {
-      const float own = here_[a].deviation;
-      const float amplified = own > 0.0f ? std::clamp(strength / own, 1.0f / mostAmplified, mostAmplified) : 1.0f;
-      sum += static_cast<A>(h[a] * amplified) * (here_[a].value - here_[a].low);
-      const float* correlation = correlation_.data() + static_cast<std::size_t>(here_[a].volume) * layers_.size();
-      variance += h[a] * h[a];
-      for (std::size_t b = 0; b < a; ++b)
-        variance += 2.0f * h[a] * h[b] * correlation[here_[b].volume];
-    }
-    return sum / static_cast<A>(std::sqrt(variance));
   }
 
   const Parts& parts_;
@@ -573,10 +579,16 @@ private:
   const StitchOutput<T>& output_;
   std::vector<Layer> layers_;
   BlendPower power_, detailPower_;
-  std::vector<int> count_, rows_;
-  std::vector<Here> here_;
-  Voxel voxel_;
-  std::vector<float> correlation_;
+  const std::size_t width_;
+  std::vector<unsigned char> changes_; // 1 where other volumes are than at the voxel before, and behind the last
+  std::vector<A> shown_, sum_;
+  std::vector<float> scratch_, correlation_;
+  std::vector<int> rows_; // the volumes of the row
+  // Those of the run, and what they have there:
+  std::vector<int> here_;
+  std::vector<const A*> values_, lows_;
+  std::vector<float*> scales_, weights_, shares_;
+  std::vector<const float*> trusts_, deviations_;
 };
 
 template <class T>

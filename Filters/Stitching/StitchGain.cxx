@@ -74,29 +74,40 @@ bool Finite(const Sample& s)
   return std::isfinite(s.x) && std::isfinite(s.y);
 }
 
+// Runs body(ia, ib, j, k) for the voxels of a pair that are looked at, ia and ib counted within the rows of a and b: of those
+// that both share every so many, another phase in every row, so that no row, plane or box loses more than its share.
+template <class Body>
+void ForSamples(const CoarseVolume& a, const CoarseVolume& b, const Body& body)
+{
+  const GridBox both = a.inside.box.Intersected(b.inside.box);
+  if (both.Empty())
+    return;
+  const int shiftA = both.first[0] - a.inside.box.first[0], shiftB = both.first[0] - b.inside.box.first[0];
+  const auto forRows = [&](const auto& row) {
+    for (int k = both.first[2]; k < both.first[2] + both.size[2]; ++k)
+      for (int j = both.first[1]; j < both.first[1] + both.size[1]; ++j)
+        row(j, k, a.inside.Row(j, k) + shiftA, b.inside.Row(j, k) + shiftB);
+  };
+  std::ptrdiff_t count = 0;
+  forRows([&](int, int, const unsigned char* insideA, const unsigned char* insideB) {
+    int shared = 0;
+    for (int i = 0; i < both.size[0]; ++i)
+      shared += insideA[i] & insideB[i] & 1;
+    count += shared;
+  });
+  const std::ptrdiff_t every = std::max<std::ptrdiff_t>(1, count / samplesOfPair);
+  forRows([&](int j, int k, const unsigned char* insideA, const unsigned char* insideB) {
+    const std::ptrdiff_t phase = (41 * static_cast<std::ptrdiff_t>(j) + 1009 * static_cast<std::ptrdiff_t>(k)) % every;
+    for (std::ptrdiff_t i = phase == 0 ? 0 : every - phase; i < both.size[0]; i += every)
+      if (insideA[i] & insideB[i] & 1)
+        body(shiftA + i, shiftB + i, j, k);
+  });
+}
+
 Shared SharedVoxels(const CoarseVolume& a, const CoarseVolume& b)
 {
   Shared shared;
-  const GridBox both = a.inside.box.Intersected(b.inside.box);
-  if (both.Empty())
-    return shared;
-  const auto forAll = [&](const auto& body) {
-    for (int k = both.first[2]; k < both.first[2] + both.size[2]; ++k)
-      for (int j = both.first[1]; j < both.first[1] + both.size[1]; ++j) {
-        const int ia = both.first[0] - a.inside.box.first[0], ib = both.first[0] - b.inside.box.first[0];
-        const unsigned char *insideA = a.inside.Row(j, k) + ia, *insideB = b.inside.Row(j, k) + ib;
-        for (int i = 0; i < both.size[0]; ++i)
-          if (insideA[i] & insideB[i] & 1)
-            body(i, j, k, ia + i, ib + i);
-      }
-  };
-  std::ptrdiff_t count = 0;
-  forAll([&count](int, int, int, int, int) { ++count; });
-  // Every so many voxels, another phase in every row: no row, plane or box loses more than its share.
-  const std::ptrdiff_t every = std::max<std::ptrdiff_t>(1, count / samplesOfPair);
-  forAll([&](int i, int j, int k, int ia, int ib) {
-    if ((i + 41 * static_cast<std::ptrdiff_t>(j) + 1009 * static_cast<std::ptrdiff_t>(k)) % every != 0)
-      return;
+  ForSamples(a, b, [&](std::ptrdiff_t ia, std::ptrdiff_t ib, int j, int k) {
     const float trust =
         (a.trust.box.Empty() ? 1.0f : a.trust.Row(j, k)[ia]) * (b.trust.box.Empty() ? 1.0f : b.trust.Row(j, k)[ib]);
     if (!(trust >= leastTrust))
@@ -273,6 +284,17 @@ void CheckBoxes(const CoarseVolume& volume, std::size_t number)
 }
 
 } // namespace
+
+void MarkStitchSamples(std::vector<CoarseVolume>& volumes)
+{
+  ParallelFor(static_cast<std::ptrdiff_t>(volumes.size()), [&](std::ptrdiff_t v) {
+    CoarseVolume& own = volumes[v];
+    own.wanted = {own.inside.box, Volume<unsigned char>(own.inside.box.size)};
+    for (const CoarseVolume& other : volumes)
+      if (&other != &own)
+        ForSamples(own, other, [&own](std::ptrdiff_t i, std::ptrdiff_t, int j, int k) { own.wanted.Row(j, k)[i] = 1; });
+  });
+}
 
 StitchGains EstimateStitchGains(const std::vector<CoarseVolume>& volumes, bool correct)
 {

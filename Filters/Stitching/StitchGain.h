@@ -13,6 +13,10 @@ struct StitchGains {
   Eigen::MatrixXd detailCorrelation;
 };
 
+/// Marks the voxels at which EstimateStitchGains() will look at a volume: some ten thousand per pair. Only there have the other
+/// fields to be filled in. Needs to know where each volume is inside.
+void MarkStitchSamples(std::vector<CoarseVolume>& volumes);
+
 /// Gain and offset per volume that make overlapping volumes agree, by least squares over the graph of overlaps.
 ///
 /// Speckle and errors stand in both volumes of a pair, so its gain is the ratio of the standard deviations of their smooth

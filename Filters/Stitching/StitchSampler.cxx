@@ -104,6 +104,15 @@ void StitchSampler::Values(int j, int k, const unsigned char* inside, A* values)
 template void StitchSampler::Values<float>(int, int, const unsigned char*, float*) const;
 template void StitchSampler::Values<double>(int, int, const unsigned char*, double*) const;
 
+template <class A>
+void StitchSampler::Read(int j, int k, unsigned char* inside, A* values) const
+{
+  std::visit([&](const auto& sampler) { sampler.Read(j, k, inside, values); }, sampler_);
+}
+
+template void StitchSampler::Read<float>(int, int, unsigned char*, float*) const;
+template void StitchSampler::Read<double>(int, int, unsigned char*, double*) const;
+
 void StitchSampler::Trust(int j, int k, const unsigned char* inside, float* trust) const
 {
   trust_->Values(j, k, inside, trust);

@@ -49,6 +49,8 @@ public:
   void Inside(int j, int k, unsigned char* inside) const;
   template <class A>
   void Values(int j, int k, const unsigned char* inside, A* values) const;
+  template <class A>
+  void Read(int j, int k, unsigned char* inside, A* values) const;
   /// How far the voxels can be trusted, in [floor, 1]; only with HasTrust().
   void Trust(int j, int k, const unsigned char* inside, float* trust) const;
 

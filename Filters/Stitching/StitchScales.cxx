@@ -2,8 +2,11 @@
 // One volume after the other, so that the maps or levels of one live at a time; what is kept are the scales of the overlap.
 #include "StitchScales.h"
 #include "BlendWeights.h"
+#include "Core/Base/Multiversion.h"
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 namespace echorama {
@@ -105,6 +108,25 @@ RowField<float> DepthScale(const RegionMap& regions, VolumeView<const unsigned c
   return scale;
 }
 
+// What the voxels of a row are to the membrane of a volume, before other volumes' cores and membranes are looked at: beside the
+// volume's box, and within it, where \a mask says where it is (bit 0) and has its core (bit 1).
+ECHORAMA_HOT void BeginBeside(const unsigned char* coverage, int count, unsigned char* kind)
+{
+  for (int i = 0; i < count; ++i)
+    kind[i] = static_cast<unsigned char>(coverage[i] != 0 ? MembraneVoxel::Known : MembraneVoxel::Void);
+}
+
+ECHORAMA_HOT void BeginWithin(const unsigned char* coverage, const unsigned char* mask, int count, unsigned char* __restrict kind,
+                              float* __restrict value)
+{
+  for (int i = 0; i < count; ++i) {
+    const int here = mask[i] & 1, alone = here & (coverage[i] == 1 ? 1 : mask[i] >> 1);
+    const int there = coverage[i] != 0 ? 1 : 0;
+    kind[i] = static_cast<unsigned char>(there * (2 - (here & ~alone & 1))); // void, unknown, known
+    value[i] = static_cast<float>(alone & 1);
+  }
+}
+
 RowField<float> MembraneScale(const StitchParameters& parameters, const RegionMap& regions, const OverlapComponents& components,
                               VolumeView<const unsigned char> coverage, const Eigen::Vector3d& spacing, int volume,
                               const std::vector<RowField<float>>& before, double& worst, const Progress& progress)
@@ -112,50 +134,53 @@ RowField<float> MembraneScale(const StitchParameters& parameters, const RegionMa
   RowField<float> scale(OverlapSpans(regions, coverage, volume, true));
   if (scale.values.empty())
     return scale;
-  RowField<unsigned char> kinds(scale.spans, static_cast<unsigned char>(MembraneVoxel::Void));
+  RowField<unsigned char> kinds(scale.spans);
   const GridBox& own = regions.Box(volume);
   std::vector<int> cored; // other volumes with a core
   for (int other = 0; other < regions.Count(); ++other)
     if (other != volume && regions.HasCore(other))
       cored.push_back(other);
+  std::atomic<bool> any = false;
   ForRows(scale.spans->Box(), Progress(), [&](int j, int k) {
     const int first = scale.spans->First(j, k), end = scale.spans->End(j, k);
-    const unsigned char* covered = coverage.Row(j, k);
-    const unsigned char* inside = own.HasRow(j, k) ? regions.MaskRow(volume, j, k) - own.first[0] : nullptr;
-    unsigned char* kind = kinds.Row(j, k);
-    float* value = scale.Row(j, k);
-    OverlapComponents::Row pieces = components.RowAt(j, k);
-    const auto known = [&](int i, float v) {
-      kind[i - first] = static_cast<unsigned char>(MembraneVoxel::Known);
-      value[i - first] = v;
-    };
-    const auto otherCore = [&](int i) {
-      return std::any_of(cored.begin(), cored.end(), [&](int other) {
-        const GridBox& box = regions.Box(other);
-        return box.HasRow(j, k) && i >= box.first[0] && i < box.first[0] + box.size[0] &&
-               (regions.MaskRow(other, j, k)[i - box.first[0]] & 2) != 0;
-      });
-    };
-    for (int i = first; i < end; ++i) {
-      if (covered[i] == 0)
-        continue;
-      const bool here = inside && i >= own.first[0] && i < own.first[0] + own.size[0] && (inside[i] & 1);
-      if (!here)
-        known(i, 0.0f);
-      else if (covered[i] == 1 || (inside[i] & 2))
-        known(i, 1.0f);
-      else if (!cored.empty() && otherCore(i))
-        known(i, 0.0f);
-      else if (const int partner = pieces.PartnerOf(volume, i); partner >= 0 && partner < volume) {
-        // The rest of the other; kept out of this volume's own membrane.
-        const RowField<float>& rest = before[partner];
-        value[i - first] = 1.0f - rest.Row(j, k)[i - rest.spans->First(j, k)];
-      } else
-        kind[i - first] = static_cast<unsigned char>(MembraneVoxel::Unknown);
+    if (first >= end)
+      return;
+    unsigned char* const kind = kinds.Row(j, k) - first;
+    float* const value = scale.Row(j, k) - first;
+    const unsigned char* const covered = coverage.Row(j, k);
+    // The part of the span that lies in the box of the volume; beside it only others can be.
+    const bool has = own.HasRow(j, k);
+    const int from = has ? std::clamp(own.first[0], first, end) : end;
+    const int to = has ? std::clamp(own.first[0] + own.size[0], from, end) : end;
+    BeginBeside(covered + first, from - first, kind + first);
+    BeginBeside(covered + to, end - to, kind + to);
+    if (from == to)
+      return;
+    BeginWithin(covered + from, regions.MaskRow(volume, j, k) + (from - own.first[0]), to - from, kind + from, value + from);
+    constexpr auto unknown = static_cast<unsigned char>(MembraneVoxel::Unknown);
+    for (const int other : cored) {
+      const GridBox row = GridBox{{from, j, k}, {to - from, 1, 1}}.Intersected(regions.Box(other));
+      const unsigned char* const mask = row.Empty() ? nullptr : regions.MaskRow(other, j, k) - regions.Box(other).first[0];
+      for (int i = row.first[0]; mask && i < row.first[0] + row.size[0]; ++i)
+        if (kind[i] == unknown && (mask[i] & 2) != 0)
+          kind[i] = static_cast<unsigned char>(MembraneVoxel::Known);
     }
+    components.ForRuns(volume, j, k, [&](int begin, int behind, int partner) {
+      if (partner < 0 || partner >= volume)
+        return;
+      // The rest of the other; kept out of this volume's own membrane.
+      const RowField<float>& rest = before[partner];
+      const float* const other = rest.Row(j, k) - rest.spans->First(j, k);
+      for (int i = std::max(begin, from); i < std::min(behind, to); ++i)
+        if (kind[i] == unknown) {
+          kind[i] = static_cast<unsigned char>(MembraneVoxel::Void);
+          value[i] = 1.0f - other[i];
+        }
+    });
+    if (!any && std::memchr(kind + from, unknown, static_cast<std::size_t>(to - from)))
+      any = true;
   });
-  if (std::none_of(kinds.values.begin(), kinds.values.end(),
-                   [](unsigned char kind) { return kind == static_cast<unsigned char>(MembraneVoxel::Unknown); }))
+  if (!any)
     return scale;
   MembraneParameters membrane;
   // An exponent multiplies the error of a scale: the weights are certified for exponents up to 32.

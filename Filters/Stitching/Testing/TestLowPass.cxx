@@ -39,11 +39,13 @@ TEST(LowPass, KeepsConstantsAndLosesTexture)
   const Volume<unsigned char> shared(grid.dimensions, 2);
   const BlockLattice blocks = BlocksOf(grid, 2.0);
   const Volume<float> constant(grid.dimensions, 0.1f);
-  const SmoothPart flat = LowPass(SamplerOf(constant, grid, grid), blocks, shared.View(), 1);
-  for (const float value : flat.low.values.View())
-    EXPECT_EQ(value, 0.1f);
-  for (const float value : flat.deviation.values.View())
-    EXPECT_EQ(value, 0.0f);
+  for (const double scale : {2.0, 5.0, 16.0}) {
+    const SmoothPart flat = LowPass(SamplerOf(constant, grid, grid), BlocksOf(grid, scale), shared.View(), 1);
+    for (const float value : flat.low.values.View())
+      EXPECT_EQ(value, 0.1f);
+    for (const float value : flat.deviation.values.View())
+      EXPECT_EQ(value, 0.0f);
+  }
 
   Volume<float> noise(grid.dimensions);
   Random random(1);

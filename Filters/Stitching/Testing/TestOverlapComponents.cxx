@@ -26,8 +26,12 @@ struct Pieces {
   }
   int PartnerOf(int volume, int i, int j, int k) const
   {
-    OverlapComponents::Row row = components.RowAt(j, k);
-    return row.PartnerOf(volume, i);
+    int partner = -2; // not in the overlap
+    components.ForRuns(volume, j, k, [&](int begin, int end, int other) {
+      if (i >= begin && i < end)
+        partner = other;
+    });
+    return partner;
   }
 };
 

@@ -17,11 +17,11 @@ TEST(RowField, NumbersTheVoxelsOfItsSpans)
   EXPECT_EQ(spans->End(4, 4), 12);
   EXPECT_EQ(spans->First(3, 5), spans->End(3, 5));
   EXPECT_EQ(spans->First(9, 4), spans->End(9, 4)) << "rows outside of the box are empty";
-  RowField<int> field(spans, 7);
+  RowField<int> field(spans);
   EXPECT_EQ(field.Row(3, 5), nullptr);
   field.Row(4, 5)[0] = 1;
   EXPECT_EQ(field.values.back(), 1);
-  EXPECT_EQ(field.values.front(), 7);
+  EXPECT_EQ(field.values.front(), 0);
 }
 
 TEST(RowField, RefusesSpansOutsideOfTheirBox)

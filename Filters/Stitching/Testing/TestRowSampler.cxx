@@ -42,12 +42,20 @@ void ExpectAsSampler(const PosedVolume<T>& volume, const ImageGeometry& grid, do
   const GridBox& box = rows.Box();
   std::vector<unsigned char> inside(box.size[0]);
   std::vector<A> values(box.size[0]);
+  std::vector<unsigned char> readInside(box.size[0]);
+  std::vector<A> readValues(box.size[0]);
   int found = 0;
   for (int k = 0; k < grid.dimensions[2]; ++k)
     for (int j = 0; j < grid.dimensions[1]; ++j) {
       if (box.HasRow(j, k)) {
         rows.Inside(j, k, inside.data());
         rows.Values(j, k, inside.data(), values.data());
+        rows.Read(j, k, readInside.data(), readValues.data());
+        ASSERT_EQ(readInside, inside) << j << " " << k;
+        for (std::size_t i = 0; i < inside.size(); ++i)
+          if (inside[i]) {
+            ASSERT_EQ(readValues[i], values[i]) << i << " " << j << " " << k;
+          }
       }
       for (int i = 0; i < grid.dimensions[0]; ++i) {
         const Eigen::Vector3d at = map * Eigen::Vector3d(i, j, k);
@@ -89,6 +97,36 @@ TEST(RowSampler, GivesWhatSamplerGives)
     ExpectAsSampler<unsigned short, float>(RandomScene<unsigned short>(geometry.dimensions, random).Posed(geometry), grid, 1e-3);
     ExpectAsSampler<float, float>(RandomScene<float>(geometry.dimensions, random, true).Posed(geometry), grid, 1e-3);
     ExpectAsSampler<double, double>(RandomScene<double>(geometry.dimensions, random, true).Posed(geometry), grid, 1e-9);
+  }
+}
+
+// Rows of many voxels, which are done some at a time; with a hole, with a mask that leaves out nothing, and without one.
+TEST(RowSampler, LongRows)
+{
+  Random random(8);
+  for (int trial = 0; trial < 6; ++trial) {
+    ImageGeometry geometry;
+    geometry.dimensions = {210, 9, 7};
+    geometry.direction = ExpRotation(random.Uniform(0.0, 0.02) * random.Direction());
+    geometry.origin = 2.0 * random.Direction();
+    const ImageGeometry grid = Grid({260, 12, 9}, trial % 2 ? 0.83 : 1.0);
+    Scene<unsigned char> bytes = RandomScene<unsigned char>(geometry.dimensions, random);
+    Scene<float> floats = RandomScene<float>(geometry.dimensions, random);
+    for (unsigned char& valid : bytes.valid.View())
+      valid = 1;
+    PosedVolume<unsigned char> open = bytes.Posed(geometry);
+    ExpectAsSampler<unsigned char, float>(open, grid, 1e-3);
+    open.valid = {};
+    ExpectAsSampler<unsigned char, float>(open, grid, 1e-3);
+    PosedVolume<float> openFloats = floats.Posed(geometry);
+    openFloats.valid = {};
+    ExpectAsSampler<float, float>(openFloats, grid, 1e-3);
+    for (int i = 90; i < 120; ++i)
+      bytes.valid.View()(i, 4, 3) = 0;
+    ExpectAsSampler<unsigned char, float>(bytes.Posed(geometry), grid, 1e-3);
+    floats.values.View()(100, 4, 3) = std::numeric_limits<float>::quiet_NaN();
+    openFloats.intensity = floats.values.View();
+    ExpectAsSampler<float, double>(openFloats, grid, 1e-3);
   }
 }
 
