@@ -31,7 +31,7 @@ def __dir__():
     return sorted({*globals(), *__all__})
 " @ONLY)
 install(FILES ${CMAKE_BINARY_DIR}/${ECHORAMA_PYTHON_PACKAGES}/echorama/__init__.py
-  DESTINATION ${ECHORAMA_PYTHON_PACKAGES}/echorama)
+  DESTINATION ${ECHORAMA_PYTHON_PACKAGES}/echorama COMPONENT python)
 # What one builds to have it. Wrappers are compiled longer than they run.
 foreach(module IN LISTS modules)
   string(REPLACE "::" "" target ${module}Python)

@@ -1,5 +1,6 @@
 # How every target of ours is compiled.
 include(GNUInstallDirs)
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME runtime) # packages are made of components (EchoramaPackaging)
 
 set(CMAKE_CXX_STANDARD 17) # VTK 9.1's SMP headers do not compile as C++20
 set(CMAKE_CXX_STANDARD_REQUIRED ON)

@@ -10,7 +10,7 @@ find_package(ParaView 5.11 REQUIRED COMPONENTS RemotingCore RemotingServerManage
 message(STATUS "ParaView ${ParaView_VERSION}")
 include(EchoramaDependencies)
 include(${ECHORAMA_KERNELS_DIR}/EchoramaKernels-targets.cmake)
-set(ECHORAMA_PYTHON_PACKAGES python3/paraview-packages)
+set(ECHORAMA_PYTHON_PACKAGES python3/paraview-packages CACHE STRING "folder of the Python package, relative to the build tree and to the prefix")
 
 set(modules)
 foreach(room IN LISTS ECHORAMA_ROOMS)
@@ -35,3 +35,4 @@ include(EchoramaPythonPackage)
 if(ECHORAMA_TESTING)
   add_subdirectory(Plugin/Testing)
 endif()
+include(EchoramaPackaging)

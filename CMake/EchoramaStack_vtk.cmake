@@ -10,7 +10,7 @@ find_package(VTK 9.1 REQUIRED COMPONENTS ${ECHORAMA_VTK_COMPONENTS} FiltersHybri
 find_package(Qt5 QUIET COMPONENTS OpenGL Widgets Test) # here, where VTK's targets look for it
 include(EchoramaDependencies)
 set(ECHORAMA_PYTHON /usr/bin/python3) # Debian's VTK is wrapped for Debian's Python, whatever else is on PATH
-set(ECHORAMA_PYTHON_PACKAGES python3/dist-packages)
+set(ECHORAMA_PYTHON_PACKAGES python3/dist-packages CACHE STRING "folder of the Python package, relative to the build tree and to the prefix")
 set(ECHORAMA_PYTHON_PATH ${CMAKE_BINARY_DIR}/${ECHORAMA_PYTHON_PACKAGES})
 
 # Rooms of kernels alone are no modules of VTK.
@@ -37,10 +37,11 @@ include(EchoramaPythonPackage)
 get_property(kernel_targets GLOBAL PROPERTY ECHORAMA_KERNEL_TARGETS)
 export(TARGETS ${kernel_targets} NAMESPACE Echorama:: FILE ${CMAKE_BINARY_DIR}/EchoramaKernels-targets.cmake)
 install(EXPORT EchoramaKernels NAMESPACE Echorama:: FILE EchoramaKernels-targets.cmake
-  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/echorama)
+  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/echorama COMPONENT development)
 include(EchoramaPackage)
 
 add_subdirectory(Applications)
 if(ECHORAMA_TESTING)
   add_subdirectory(Testing)
 endif()
+include(EchoramaPackaging)

@@ -190,14 +190,16 @@ void EchoramaCommand(CLI::App* options, Action& action)
   auto values = std::make_shared<AlignOptions>();
   const auto aligner = vtkSmartPointer<vtkUltrasoundAligner>::New();
   const auto deformer = vtkSmartPointer<vtkUltrasoundDeformableAligner>::New();
-  options->add_option("volume", values->files, "Two or more volumes")->required();
-  options->add_option("-o,--output", values->output,
-                      std::string("Pose file to write (default: ") + DefaultOutput + ", unless it is there)");
+  options->add_option("volume", values->files, "Two or more volumes")->type_name("VOLUME")->required();
+  options
+      ->add_option("-o,--output", values->output,
+                   std::string("Pose file to write (default: ") + DefaultOutput + ", unless it is there)")
+      ->type_name("FILE");
   options->add_option("--hold", values->held,
                       "A volume (from 1) that stays where it is beside the fixed one; again for each")
       ->allow_extra_args(false) // volumes may follow
       ->check(CLI::Range(1, 1000000));
-  options->add_option("--poses", values->poses, "Pose file to start from (default: where the volumes say)");
+  options->add_option("--poses", values->poses, "Pose file to start from (default: where the volumes say)")->type_name("FILE");
   options->add_option("--fixed", values->fixed, "The volume (from 1) that stays where it is")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
@@ -205,13 +207,15 @@ void EchoramaCommand(CLI::App* options, Action& action)
   CLI::Option* landmarks = AddLandmarksOption(
       options, values->landmarks, "Places that were found in the volumes; those with one label in two volumes belong together");
   values->tracker.AddTo(*options, false);
-  options->add_option("--calibration", values->calibration,
-                      "Calibration of the tracked probe, as echorama calibrate hand-eye writes it");
+  options
+      ->add_option("--calibration", values->calibration,
+                   "Calibration of the tracked probe, as echorama calibrate hand-eye writes it")
+      ->type_name("FILE");
   options->add_flag("--tracker-only", values->trackerOnly, "Leave the volumes where the tracker says");
   options->get_option("--tracker")->needs("--calibration")->excludes("--poses");
   options->get_option("--calibration")->needs("--tracker");
   options->get_option("--tracker-only")->needs("--tracker")->excludes(landmarks);
-  options->add_option("--apply", values->apply, "Folder for the volumes with their new geometry");
+  options->add_option("--apply", values->apply, "Folder for the volumes with their new geometry")->type_name("FOLDER");
   CLI::Option* deformable =
       options
           ->add_flag("--deformable", values->deformable,

@@ -213,12 +213,15 @@ CalibrateKind CalibrateHandEyeCommand(CLI::App& calibrate)
   auto values = std::make_shared<HandEyeOptions>();
   CLI::App* options = calibrate.add_subcommand("hand-eye", "Where a volume is in the frame of the sensor on its probe");
   options->add_option("--volumes", values->volumes, "Three or more volumes of the calibration rig (8 to 20 are better)")
+      ->type_name("VOLUME")
       ->required();
   values->tracker.AddTo(*options, true);
-  options->add_option("-o,--output", values->output, "Calibration to write (JSON)")->required();
-  options->add_option("--poses", values->poses,
-                      "Pose file with the volumes' alignment, a person's for instance (default: they are aligned)");
-  options->add_option("--save-poses", values->savePoses, "Pose file to write the alignment to");
+  options->add_option("-o,--output", values->output, "Calibration to write (JSON)")->type_name("FILE")->required();
+  options
+      ->add_option("--poses", values->poses,
+                   "Pose file with the volumes' alignment, a person's for instance (default: they are aligned)")
+      ->type_name("FILE");
+  options->add_option("--save-poses", values->savePoses, "Pose file to write the alignment to")->type_name("FILE");
   options
       ->add_option("--align", values->align,
                    "How the volumes are aligned without --poses: rig finds the balls of the rig in each, contents aligns "

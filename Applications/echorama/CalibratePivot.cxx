@@ -57,9 +57,10 @@ CalibrateKind CalibratePivotCommand(CLI::App& calibrate)
   auto values = std::make_shared<PivotOptions>();
   CLI::App* options = calibrate.add_subcommand("pivot", "Where the tip of a tracked tool is, from turning it about its tip");
   options->add_option("--tracker", values->log, "Recording of the tool while its tip rests in one place: a sequence or a table")
+      ->type_name("FILE")
       ->required();
   options->add_option("--tool", values->tool, "The tool, as the recording calls it (default: its only one)");
-  options->add_option("-o,--output", values->output, "Calibration to write (JSON)")->required();
+  options->add_option("-o,--output", values->output, "Calibration to write (JSON)")->type_name("FILE")->required();
   AddParameter(options, Describe(values->reading), "UnitMm", "--unit");
   options->add_option("--from", values->from, "Leave out what came before, in seconds of the recording");
   options->add_option("--to", values->to, "Leave out what came after");

@@ -107,7 +107,7 @@ CalibrateKind CalibrateRigCommand(CLI::App& calibrate)
   auto values = std::make_shared<RigOptions>();
   const auto clip = vtkSmartPointer<vtkUltrasoundPrintableSource>::New();
   CLI::App* options = calibrate.add_subcommand("rig", "Make the calibration rig and the sensor's clip for a 3D printer (STL)");
-  options->add_option("-o,--output", values->folder, "Folder for the files")->required();
+  options->add_option("-o,--output", values->folder, "Folder for the files")->type_name("FOLDER")->required();
   options->add_option("--scale", values->scales, "Sizes of the rig; again for each")
       ->check(CLI::Range(0.2, 5.0))
       ->capture_default_str();

@@ -558,10 +558,13 @@ CalibrateKind CalibrateSurfaceCommand(CLI::App& calibrate)
       calibrate.add_subcommand("surface", "A camera in a printed skin, from a light that is put on numbered marks");
   options->add_option("camera", values->camera, "The camera, as camera:0?width=640&height=480, recording:FILE or simulated:?...")
       ->required();
-  options->add_option("--mesh", values->mesh, "The surface that the skin was made of, mm");
-  options->add_option("--marks", values->marks, "Its marks in their order: points.csv of echorama shell, or any list of points");
-  options->add_option("-o,--output", values->output, "Calibration to write (.json; the mesh goes beside it as .stl)");
-  options->add_option("--check", values->check, "See whether this calibration still holds, by some of its marks");
+  options->add_option("--mesh", values->mesh, "The surface that the skin was made of, mm")->type_name("FILE");
+  options->add_option("--marks", values->marks, "Its marks in their order: points.csv of echorama shell, or any list of points")
+      ->type_name("FILE");
+  options->add_option("-o,--output", values->output, "Calibration to write (.json; the mesh goes beside it as .stl)")
+      ->type_name("FILE");
+  options->add_option("--check", values->check, "See whether this calibration still holds, by some of its marks")
+      ->type_name("FILE");
   options->add_option("--check-marks", values->checkMarks, "How many")->check(CLI::Range(4, 100))->capture_default_str();
   options->add_option("--shell", values->shell,
                       "What the marker in the shell says, where the camera does not see it; another one is refused");

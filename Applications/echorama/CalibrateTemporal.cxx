@@ -50,15 +50,16 @@ CalibrateKind CalibrateTemporalCommand(CLI::App& calibrate)
 {
   auto values = std::make_shared<TemporalOptions>();
   CLI::App* options = calibrate.add_subcommand("temporal", "The offset between the clocks of two recordings of one motion");
-  options->add_option("first", values->first, "Recording whose clock counts")->required();
+  options->add_option("first", values->first, "Recording whose clock counts")->type_name("FILE")->required();
   options->add_option("second", values->second, "Recording of the same motion; may be the same file, with another tool")
+      ->type_name("FILE")
       ->required();
   options->add_option("--tool", values->firstTool, "The tool in the first recording (default: its only one)");
   options->add_option("--second-tool", values->secondTool, "The tool in the second (default: its only one)");
   AddParameter(options, Describe(values->parameters), "Signal");
   AddParameter(options, Describe(values->parameters), "LargestOffset", "--largest");
   AddParameter(options, Describe(values->reading), "UnitMm", "--unit");
-  options->add_option("-o,--output", values->output, "Write the result as JSON");
+  options->add_option("-o,--output", values->output, "Write the result as JSON")->type_name("FILE");
   return {options, [values](Session& session) { CalibrateClocks(session, *values); }};
 }
 

@@ -123,8 +123,9 @@ void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<ConvertOptions>();
   options->add_option("input", values->input, "Volume of any format (a file, or a folder of slices), sequence or transforms")
+      ->type_name("FILE")
       ->required();
-  options->add_option("output", values->output, "File to write; its extension names the format")->required();
+  options->add_option("output", values->output, "File to write; its extension names the format")->type_name("FILE")->required();
   options->add_option("--time", values->reading.step, "Which volume of a time series, from 0")
       ->check(CLI::Range(0, 2147483647))
       ->capture_default_str();

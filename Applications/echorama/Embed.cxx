@@ -95,10 +95,14 @@ void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<EmbedOptions>();
   const auto embedder = vtkSmartPointer<vtkUltrasoundEmbedder>::New();
-  options->add_option("volume", values->file, "Volume of any format")->required();
-  options->add_option("-o,--output", values->output, "File to write; its extension names the format")->required();
-  options->add_option("--noise", values->noise, "Real noise volumes for the background (default: noise is made)");
-  options->add_option("--form", values->form, "Volume whose fan is the outline; it grows until it holds all data");
+  options->add_option("volume", values->file, "Volume of any format")->type_name("VOLUME")->required();
+  options->add_option("-o,--output", values->output, "File to write; its extension names the format")
+      ->type_name("VOLUME")
+      ->required();
+  options->add_option("--noise", values->noise, "Real noise volumes for the background (default: noise is made)")
+      ->type_name("VOLUME");
+  options->add_option("--form", values->form, "Volume whose fan is the outline; it grows until it holds all data")
+      ->type_name("VOLUME");
   AddParameter(options, embedder, "MatchGrain", "--match");
   AddParameter(options, embedder, "MatchContrast", "--contrast");
   for (const char* asItIs : {"--match", "--contrast"})

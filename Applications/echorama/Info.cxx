@@ -105,6 +105,7 @@ void EchoramaCommand(CLI::App* options, Action& action)
   options
       ->add_option("file", *files,
                    "Volumes of any format, tracked sequences, pose files (.json), transforms (.json, .xml of Plus)")
+      ->type_name("FILE")
       ->required();
   action = [files](Session& session) {
     session.result["files"] = Json::array();

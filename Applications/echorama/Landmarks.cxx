@@ -8,10 +8,11 @@ namespace echorama {
 
 CLI::Option* AddLandmarksOption(CLI::App* options, std::vector<std::string>& files, const std::string& use)
 {
-  return options->add_option("--landmarks", files,
-                             use +
-                                 ": a list (.fcsv, .mrk.json, .csv; -: none) for each volume, in their order, each in the frame "
-                                 "of its volume's file");
+  return options
+      ->add_option("--landmarks", files,
+                   use + ": a list (.fcsv, .mrk.json, .csv; -: none) for each volume, in their order, each in the frame "
+                         "of its volume's file")
+      ->type_name("FILE");
 }
 
 std::vector<LandmarkList> ReadLandmarkLists(const std::vector<std::string>& files, std::size_t volumes, const std::string& whose)

@@ -89,8 +89,8 @@ void ResampleMotion(Session& session, const MotionOptions& options)
 void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<MotionOptions>();
-  options->add_option("recording", values->log, "Recording of a tracker: a sequence or a table")->required();
-  options->add_option("-o,--output", values->output, "Sequence to write (.igs.mha)")->required();
+  options->add_option("recording", values->log, "Recording of a tracker: a sequence or a table")->type_name("FILE")->required();
+  options->add_option("-o,--output", values->output, "Sequence to write (.igs.mha)")->type_name("FILE")->required();
   options->add_option("--tool", values->tool, "The tool, as the recording calls it (default: its only one)");
   AddParameter(options, Describe(values->reading), "UnitMm", "--unit");
   options->add_option("--rate", values->rate, "Poses a second")->check(CLI::Range(1e-3, 1e5))->capture_default_str();

@@ -86,10 +86,11 @@ void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<NoiseOptions>();
   const Source source = vtkSmartPointer<vtkUltrasoundNoiseSource>::New();
-  options->add_option("-o,--output", values->output, "Volume to write")->required();
-  options->add_option("--match", values->match, "Volume whose grain and intensities the noise shall have");
-  options->add_option("--form", values->form,
-                      "Volume whose fan the noise shall fill (else that of --match, else the options below)");
+  options->add_option("-o,--output", values->output, "Volume to write")->type_name("VOLUME")->required();
+  options->add_option("--match", values->match, "Volume whose grain and intensities the noise shall have")->type_name("VOLUME");
+  options
+      ->add_option("--form", values->form, "Volume whose fan the noise shall fill (else that of --match, else the options below)")
+      ->type_name("VOLUME");
   AddParameter(options, source, "OnInputGrid", "--on-grid");
   AddParameters(options, source, {"Seed", "Kind"});
   AddParameter(options, source, "IntensityModel", "--intensity");

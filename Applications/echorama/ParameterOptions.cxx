@@ -2,6 +2,7 @@
 #include "ParameterOptions.h"
 #include <cctype>
 #include <CLI/Error.hpp>
+#include <map>
 
 namespace echorama {
 namespace {
@@ -37,7 +38,19 @@ std::string FlagHelp(std::string help, bool on)
   return help;
 }
 
+std::map<const CLI::Option*, Parameter>& Known()
+{
+  static std::map<const CLI::Option*, Parameter> known;
+  return known;
+}
+
 } // namespace
+
+const Parameter* ParameterOf(const CLI::Option* option)
+{
+  const auto found = Known().find(option);
+  return found == Known().end() ? nullptr : &found->second;
+}
 
 CLI::Option* AddParameter(CLI::App* options, Parameter parameter, std::string flag, std::any owner)
 {
@@ -47,8 +60,10 @@ CLI::Option* AddParameter(CLI::App* options, Parameter parameter, std::string fl
     const bool wanted = !**place;
     if (!wanted && flag.rfind("--no-", 0) != 0)
       flag.insert(2, "no-");
-    return options->add_flag_callback(
+    CLI::Option* option = options->add_flag_callback(
         flag, [target = *place, wanted, owner] { *target = wanted; }, FlagHelp(HelpOf(parameter), wanted));
+    Known().emplace(option, std::move(parameter));
+    return option;
   }
   const std::string help = HelpOf(parameter);
   const bool isVector = std::holds_alternative<Eigen::Vector3d*>(parameter.value);
@@ -66,7 +81,11 @@ CLI::Option* AddParameter(CLI::App* options, Parameter parameter, std::string fl
   CLI::Option* option = options->add_option_function<std::vector<std::string>>(flag, set, help)->expected(isVector ? 3 : 1);
   const auto* choice = std::get_if<Choice>(&parameter.value);
   option->type_name(choice ? "" : isVector ? "X Y Z" : std::holds_alternative<std::string*>(parameter.value) ? "TEXT" : "NUMBER");
-  return option->default_str(parameter.Text());
+  option->default_str(parameter.Text());
+  if (isVector)
+    option->delimiter(','); // 3D Slicer writes 1,2,3
+  Known().emplace(option, std::move(parameter));
+  return option;
 }
 
 } // namespace echorama

@@ -13,7 +13,11 @@ namespace echorama {
 /// parameter lies in must live as long as \a options: \a owner keeps it.
 ECHORAMA_PROGRAM_EXPORT CLI::Option* AddParameter(CLI::App* options, Parameter parameter, std::string flag, std::any owner);
 
-/// The same for one of a struct that outlives \a options: AddParameter(options, Describe(values->smoothing), "WindowSeconds").
+/// The parameter that an option sets; nullptr when AddParameter() did not make it.
+ECHORAMA_PROGRAM_EXPORT const Parameter* ParameterOf(const CLI::Option* option);
+
+/// As the first, for one of a struct that outlives \a options: AddParameter(options, Describe(values->smoothing),
+/// "WindowSeconds").
 inline CLI::Option* AddParameter(CLI::App* options, ParameterList parameters, const std::string& name, std::string flag = {})
 {
   return AddParameter(options, Named(parameters, name), std::move(flag), {});

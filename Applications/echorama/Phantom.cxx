@@ -64,6 +64,7 @@ void EchoramaCommand(CLI::App* options, Action& action)
   auto values = std::make_shared<PhantomOptions>();
   const auto source = vtkSmartPointer<vtkUltrasoundPhantomSource>::New();
   options->add_option("-o,--output", values->folder, "Folder for the volumes and truth.json, the poses that put them back")
+      ->type_name("FOLDER")
       ->required();
   options->add_option("--count", values->count, "How many volumes")->check(CLI::Range(1, 50))->capture_default_str();
   AddParameter(options, source, "Seed")->description("Seed of tissue and displacements");

@@ -69,8 +69,9 @@ void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<ProbeFitOptions>();
   const auto filter = vtkSmartPointer<vtkUltrasoundProbeFit>::New();
-  options->add_option("volume", values->file, "Volume of any format")->required();
-  options->add_option("-o,--output", values->output, "Also write the volume with the geometry and pose of the probe");
+  options->add_option("volume", values->file, "Volume of any format")->type_name("VOLUME")->required();
+  options->add_option("-o,--output", values->output, "Also write the volume with the geometry and pose of the probe")
+      ->type_name("VOLUME");
   AddParameters(options, filter, {"MinimumOverlap", "MaximumDistance"});
   CLI::Option* enclose = AddParameter(options, filter, "EncloseRegion", "--enclose");
   AddParameter(options, filter, "MarginMm", "--margin")->needs(enclose);

@@ -188,11 +188,17 @@ void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<ReconstructOptions>();
   const auto reconstructor = vtkSmartPointer<Reconstructor>::New();
-  options->add_option("sequence", values->sequence, "Tracked sequence (.igs.mha .seq.mha .mhd .seq.nrrd .nhdr)")->required();
-  options->add_option("-o,--output", values->output, "File to write; its extension names the format")->required();
-  options->add_option(
-      "--transforms", values->transforms,
-      "Transforms that hold for all frames, such as the probe's calibration: a configuration of Plus (.xml) or .json");
+  options->add_option("sequence", values->sequence, "Tracked sequence (.igs.mha .seq.mha .mhd .seq.nrrd .nhdr)")
+      ->type_name("FILE")
+      ->required();
+  options->add_option("-o,--output", values->output, "File to write; its extension names the format")
+      ->type_name("VOLUME")
+      ->required();
+  options
+      ->add_option(
+          "--transforms", values->transforms,
+          "Transforms that hold for all frames, such as the probe's calibration: a configuration of Plus (.xml) or .json")
+      ->type_name("FILE");
   options->add_option(
       "--transform", values->transform,
       "Name of the transform that places the images, such as ImageToReference (default: from Image to the first of "

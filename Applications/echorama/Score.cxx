@@ -99,8 +99,10 @@ void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<ScoreOptions>();
   const auto score = vtkSmartPointer<vtkUltrasoundAlignmentScore>::New();
-  options->add_option("poses", values->poses, "Pose file to score; with --truth its volumes are read")->required();
-  options->add_option("--truth", values->truth, "Pose file that says where the volumes belong");
+  options->add_option("poses", values->poses, "Pose file to score; with --truth its volumes are read")
+      ->type_name("FILE")
+      ->required();
+  options->add_option("--truth", values->truth, "Pose file that says where the volumes belong")->type_name("FILE");
   AddLandmarksOption(options, values->landmarks, "Landmarks to compare the poses with");
   options->add_option("--fixed", values->fixed, "The volume (from 1) that both pose files are taken to agree on")
       ->check(CLI::Range(1, 1000000))

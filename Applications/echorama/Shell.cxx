@@ -121,8 +121,10 @@ void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<ShellOptions>();
   const auto filter = vtkSmartPointer<vtkUltrasoundShell>::New();
-  options->add_option("body", values->body, "A closed surface in mm (.stl, .ply, .obj, .vtp, .glb)")->required();
-  options->add_option("-o,--output", values->folder, "Folder for the files")->required();
+  options->add_option("body", values->body, "A closed surface in mm (.stl, .ply, .obj, .vtp, .glb)")
+      ->type_name("FILE")
+      ->required();
+  options->add_option("-o,--output", values->folder, "Folder for the files")->type_name("FOLDER")->required();
   AddParametersBut(options, filter, {});
   action = [values, filter](Session& session) { MakeShellFiles(session, *values, filter); };
 }

@@ -221,10 +221,14 @@ void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<StitchOptions>();
   const auto stitcher = vtkSmartPointer<vtkUltrasoundStitcher>::New();
-  options->add_option("volume", values->files, "Two or more volumes")->required();
-  options->add_option("-o,--output", values->output, "File to write; its extension names the format")->required();
-  options->add_option("--poses", values->poses,
-                      "Pose file that says where the volumes belong, and how they are bent (default: where they say)");
+  options->add_option("volume", values->files, "Two or more volumes")->type_name("VOLUME")->required();
+  options->add_option("-o,--output", values->output, "File to write; its extension names the format")
+      ->type_name("VOLUME")
+      ->required();
+  options
+      ->add_option("--poses", values->poses,
+                   "Pose file that says where the volumes belong, and how they are bent (default: where they say)")
+      ->type_name("FILE");
   AddParameters(options, stitcher, {"Method", "Texture", "Sharpness", "DetailSharpness", "DetailScale"});
   AddParameter(options, stitcher, "EqualizeGain", "--gain");
   AddParameter(options, stitcher, "SpacingMm", "--spacing");

@@ -112,16 +112,17 @@ void Synthesize(Session& session, const SynthesizeOptions& options)
 void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<SynthesizeOptions>();
-  options->add_option("scene", values->scene, "The scene, JSON (see Documentation/scenes.md)")->required();
+  options->add_option("scene", values->scene, "The scene, JSON (see Documentation/scenes.md)")->type_name("FILE")->required();
   options
       ->add_option("-o,--output", values->folder,
                    "Folder for the volumes, their beams, the geometry, the scene, and truth.json, the poses that put them back")
+      ->type_name("FOLDER")
       ->required();
   options->add_option("--seed", values->seed, "Seed instead of the scene's")
       ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 62));
   values->spacing = AddParameter(options, Describe(values->volume), "SpacingMm", "--spacing")->default_str("the scene's");
-  options->add_option("--data", values->data,
-                      "Folder of the meshes and recordings that the scene names, whatever folder it says");
+  options->add_option("--data", values->data, "Folder of the meshes and recordings that the scene names, whatever folder it says")
+      ->type_name("FOLDER");
   AddSetOptions(*options, values->landmarks, values->format);
   action = [values](Session& session) { Synthesize(session, *values); };
 }

@@ -202,11 +202,13 @@ void EchoramaCommand(CLI::App* options, Action& action)
           "The tracker, as SCHEME:PLACE?OPTION=VALUE (igtl://localhost:18944, polhemus:/dev/ttyUSB0, simulated: ...; schemes: " +
               Joined(TrackerSchemes()) + "), or a recording")
       ->required();
-  options->add_option("--record", values->record,
-                      "Record to this sequence (.igs.mha), which must not be there yet; safe against a sudden end");
+  options
+      ->add_option("--record", values->record,
+                   "Record to this sequence (.igs.mha), which must not be there yet; safe against a sudden end")
+      ->type_name("FILE");
   options->add_option("--serve", values->serve,
                       "Pass poses and images on to OpenIGTLink clients at PORT or HOST:PORT (PORT alone: this machine only)");
-  options->add_option("--transforms", values->transforms, "Fixed transforms, such as a calibration");
+  options->add_option("--transforms", values->transforms, "Fixed transforms, such as a calibration")->type_name("FILE");
   options->add_option("--show", values->shown, "A transform to show while it runs, such as VolumeToTracker; again for each");
   options->add_option("--every", values->everySeconds, "How often it is shown, in seconds")
       ->check(CLI::Range(0.01, 3600.0))

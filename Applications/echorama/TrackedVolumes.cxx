@@ -7,9 +7,11 @@ namespace echorama {
 
 void TrackerOptions::AddTo(CLI::App& options, bool required)
 {
-  CLI::Option* file = options.add_option("--tracker", log,
-                                         "Recording of the tracker: a sequence (.igs.mha), a table (.csv), as echorama track "
-                                         "--record writes it");
+  CLI::Option* file = options
+                          .add_option("--tracker", log,
+                                      "Recording of the tracker: a sequence (.igs.mha), a table (.csv), as echorama track "
+                                      "--record writes it")
+                          ->type_name("FILE");
   if (required)
     file->required();
   options.add_option("--tool", tool, "The tool that is fixed to the probe, as the recording calls it (default: its only one)");

@@ -538,9 +538,10 @@ void View(Session& session, ViewOptions options)
 void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<ViewOptions>();
-  options->add_option("file", values->files, "Volumes of any format")->required();
-  options->add_option("--poses", values->poses, "Pose file that says where the volumes belong");
-  options->add_option("--screenshot", values->screenshot, "Write a picture to this PNG file instead of opening a window");
+  options->add_option("file", values->files, "Volumes of any format")->type_name("VOLUME")->required();
+  options->add_option("--poses", values->poses, "Pose file that says where the volumes belong")->type_name("FILE");
+  options->add_option("--screenshot", values->screenshot, "Write a picture to this PNG file instead of opening a window")
+      ->type_name("FILE");
   options->add_flag("--labels", values->labels,
                     "Colour what of an embedded volume is invented (blue) or mixed with that (yellow)");
   options->add_option("--size", values->size, "Width and height of the window in pixels")

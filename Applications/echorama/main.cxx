@@ -3,11 +3,13 @@
 // Documentation/command-line.md.
 #include "Commands.h"
 #include "Core/Base/Parallel.h"
+#include "Describe.h"
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <CLI/Validators.hpp>
 #include <cstring>
 #include <dlfcn.h>
+#include <iostream>
 #include <vtkSMPTools.h>
 
 using namespace echorama;
@@ -49,6 +51,39 @@ void Load(CLI::App* options, Action& action)
     throw Error(Error::Kind::NotPossible, name + ": what this command needs cannot be loaded (" + dlerror() +
                                               "); install Echorama again, with all that it depends on");
   add(options, action);
+}
+
+// What the program or one of its commands says of itself for other programs: echorama [COMMAND...] --xml, --man or --completion.
+bool Describe(CLI::App& program, const std::vector<std::string>& words)
+{
+  const std::string what = words.empty() ? "" : words.back();
+  if (what != "--xml" && what != "--man" && what != "--completion")
+    return false;
+  CLI::App* app = &program;
+  std::string name;
+  Action unused;
+  for (std::size_t i = 0; i + 1 < words.size(); ++i) {
+    const std::vector<CLI::App*> found = app->get_subcommands([&](const CLI::App* each) { return each->get_name() == words[i]; });
+    if (found.empty())
+      return false; // the parser says why
+    app = found.front();
+    if (i == 0)
+      Load(app, unused);
+    name += (i == 0 ? "" : " ") + words[i];
+  }
+  const bool isWhole = app == &program, isLeaf = !isWhole && app->get_subcommands([](const CLI::App*) { return true; }).empty();
+  if (what == "--man") {
+    std::cout << ManPage(*app, name, program.get_footer());
+  } else if (what == "--xml" && isLeaf) {
+    std::cout << SlicerDescription(*app, name);
+  } else if (what == "--completion" && isWhole) {
+    for (CLI::App* each : program.get_subcommands([](const CLI::App*) { return true; }))
+      Load(each, unused);
+    std::cout << BashCompletion(program);
+  } else {
+    return false;
+  }
+  return true;
 }
 
 int Run(const std::string& command, const Action& action, bool json, int threads)
@@ -101,6 +136,8 @@ int main(int argc, char** argv)
   };
   const auto chosen = [&program] { return program.get_subcommands().empty() ? nullptr : program.get_subcommands().front(); };
   try {
+    if (Describe(program, {argv + 1, argv + argc}))
+      return 0;
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success))

@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "Describe.h"
+#include "ParameterOptions.h"
+#include <cstdio>
+#include <set>
+#include <sstream>
+
+namespace echorama {
+namespace {
+
+const std::set<std::string> Written = {"output", "save-poses", "record", "screenshot", "apply"}; // by options of these names
+
+bool All(const CLI::App*)
+{
+  return true;
+}
+
+bool IsListed(const CLI::Option* option)
+{
+  return !option->get_group().empty() && option->get_name() != "--help" && !option->check_lname("help");
+}
+
+bool IsFlag(const CLI::Option* option)
+{
+  return option->get_items_expected_max() == 0;
+}
+
+bool IsMultiple(const CLI::Option* option)
+{
+  return option->get_items_expected_max() > 16;
+}
+
+// "--output", or what a positional one is called.
+std::string LongName(const CLI::Option* option)
+{
+  return option->get_lnames().empty() ? option->get_name(true) : option->get_lnames().front();
+}
+
+// "INT", "FILE" ..., without what may be in it.
+std::string TypeOf(const CLI::Option* option)
+{
+  const std::string type = option->get_type_name();
+  return type.substr(0, type.find(':'));
+}
+
+std::vector<std::string> ChoicesOf(const CLI::Option* option)
+{
+  if (const Parameter* parameter = ParameterOf(option))
+    if (const auto* choice = std::get_if<Choice>(&parameter->value))
+      return choice->names;
+  std::vector<std::string> names; // of CLI::IsMember: "TEXT:{rig,contents}"
+  const std::string type = option->get_type_name();
+  const std::size_t from = type.find(":{"), to = type.find('}');
+  if (from != std::string::npos && to != std::string::npos) {
+    std::istringstream list(type.substr(from + 2, to - from - 2));
+    for (std::string name; std::getline(list, name, ',');)
+      names.push_back(name);
+  }
+  return names;
+}
+
+ParameterRange RangeOf(const CLI::Option* option)
+{
+  if (const Parameter* parameter = ParameterOf(option))
+    return parameter->range;
+  ParameterRange range; // of CLI::Range: "INT:INT in [1 - 1000000]"
+  const std::string type = option->get_type_name();
+  const std::size_t at = type.find(" in [");
+  double low = 0.0, high = 0.0;
+  if (at != std::string::npos && std::sscanf(type.c_str() + at, " in [%lf - %lf]", &low, &high) == 2)
+    range.low = low, range.high = high;
+  return range;
+}
+
+void Replace(std::string& text, const std::string& from, const std::string& to)
+{
+  for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
+    text.replace(at, from.size(), to);
+}
+
+std::string Xml(std::string text)
+{
+  for (const auto& [from, to] :
+       {std::pair("&", "&amp;"), std::pair("<", "&lt;"), std::pair(">", "&gt;"), std::pair("\"", "&quot;")})
+    Replace(text, from, to);
+  return text;
+}
+
+std::string Element(const std::string& name, const std::string& text)
+{
+  return "      <" + name + ">" + Xml(text) + "</" + name + ">\n";
+}
+
+// "Maximum Gap" of "maximum-gap".
+std::string Label(std::string name)
+{
+  bool begins = true;
+  for (char& letter : name) {
+    if (begins)
+      letter = static_cast<char>(std::toupper(static_cast<unsigned char>(letter)));
+    begins = letter == '-';
+    letter = begins ? ' ' : letter;
+  }
+  return name;
+}
+
+// The element of an option. A number without a default is a text there: an empty field is not given, a zero would be.
+std::string SlicerType(const CLI::Option* option)
+{
+  const std::string type = TypeOf(option), given = option->get_default_str();
+  if (IsFlag(option))
+    return "boolean";
+  if (type == "VOLUME")
+    return "image";
+  if (type == "FILE")
+    return "file";
+  if (type == "FOLDER")
+    return "directory";
+  if (!ChoicesOf(option).empty())
+    return "string-enumeration";
+  char* end = nullptr;
+  std::strtod(given.c_str(), &end);
+  if (given.empty() || end == given.c_str())
+    return "string";
+  const Parameter* parameter = ParameterOf(option);
+  if (option->get_items_expected_max() > 1)
+    return *end == ' ' || *end == ',' ? "double-vector" : "string";
+  if (*end != '\0')
+    return "string";
+  if (parameter)
+    return std::holds_alternative<std::string*>(parameter->value) ? "string"
+           : std::holds_alternative<double*>(parameter->value)    ? "double"
+                                                                  : "integer";
+  return type == "INT" || type == "UINT" ? "integer" : type == "FLOAT" ? "double" : "string";
+}
+
+std::string SlicerParameter(const CLI::Option* option, int& index)
+{
+  const std::string name = LongName(option), type = SlicerType(option);
+  const bool isFile = type == "image" || type == "file" || type == "directory";
+  std::string identifier = name;
+  Replace(identifier, "-", "_");
+  std::string text = "    <" + type + (isFile && type != "directory" && IsMultiple(option) ? " multiple=\"true\"" : "") + ">\n" +
+                     Element("name", identifier) + Element("label", Label(name));
+  if (option->get_positional())
+    text += Element("index", std::to_string(index++));
+  else
+    text += Element("longflag", "--" + name);
+  text += Element("description", option->get_description());
+  if (isFile)
+    text += Element("channel", Written.count(name) ? "output" : "input");
+  std::string given = type == "boolean" ? "false" : option->get_default_str();
+  if (type == "double-vector")
+    for (char& letter : given)
+      letter = letter == ' ' ? ',' : letter;
+  if (!given.empty() && !isFile)
+    text += Element("default", given);
+  for (const std::string& choice : ChoicesOf(option))
+    text += Element("element", choice);
+  const ParameterRange range = RangeOf(option);
+  if ((type == "double" || type == "integer") && range.low > -Unlimited && range.high < 1e15) {
+    std::ostringstream limits;
+    limits << "<minimum>" << range.low << "</minimum><maximum>" << range.high << "</maximum>";
+    text += "      <constraints>" + limits.str() + "</constraints>\n";
+  }
+  return text + "    </" + type + ">\n";
+}
+
+std::string Troff(std::string text)
+{
+  Replace(text, "\\", "\\e");
+  Replace(text, "-", "\\-");
+  if (!text.empty() && (text[0] == '.' || text[0] == '\''))
+    text.insert(0, "\\&");
+  Replace(text, "\n", "\n.br\n");
+  return text;
+}
+
+std::string TroffOptions(const CLI::App& app)
+{
+  std::string text;
+  for (const CLI::Option* option : app.get_options(IsListed)) {
+    std::string names;
+    for (const std::string& name : option->get_snames())
+      names += "-" + name + ", ";
+    names += option->get_lnames().empty() ? option->get_name(true) : "--" + option->get_lnames().front();
+    const std::vector<std::string> choices = ChoicesOf(option);
+    std::string value = IsFlag(option) || option->get_positional() ? "" : TypeOf(option), help = option->get_description();
+    if (!choices.empty() && !ParameterOf(option)) // whose help names them
+      for (const std::string& choice : choices)
+        help += (&choice == &choices.front() ? " (" : ", ") + choice + (&choice == &choices.back() ? ")" : "");
+    if (!option->get_default_str().empty())
+      help += " [" + option->get_default_str() + "]";
+    text += ".TP\n\\fB" + Troff(names) + "\\fR" + (value.empty() ? "" : " \\fI" + Troff(value) + "\\fR") +
+            (IsMultiple(option) ? " ..." : "") + "\n" + Troff(help) + "\n";
+  }
+  return text;
+}
+
+std::string Joined(const std::vector<std::string>& words)
+{
+  std::string text;
+  for (const std::string& word : words)
+    text += (text.empty() ? "" : " ") + word;
+  return text;
+}
+
+// Of one command: what may follow it.
+std::string BashCase(const CLI::App& app, const std::string& words)
+{
+  std::string options, names, values;
+  for (const CLI::Option* option : app.get_options(IsListed)) {
+    if (option->get_lnames().empty())
+      continue;
+    const std::string flag = "--" + option->get_lnames().front();
+    options += flag + " ";
+    const std::string match = option->get_snames().empty() ? flag : flag + "|-" + option->get_snames().front();
+    if (const std::vector<std::string> choices = ChoicesOf(option); !choices.empty())
+      values += "        " + match + ") values='" + Joined(choices) + "' ;;\n";
+    else if (TypeOf(option) == "FOLDER")
+      values += "        " + match + ") kind=-d ;;\n";
+  }
+  for (const CLI::App* each : app.get_subcommands(All))
+    names += each->get_name() + " ";
+  return "    '" + words + " '" + (words.empty() ? "" : "*") + ")\n      options='" + options + "' names='" + names + "'\n" +
+         (values.empty() ? "" : "      case $previous in\n" + values + "      esac\n") + "      ;;\n";
+}
+
+} // namespace
+
+std::string SlicerDescription(const CLI::App& command, const std::string& name)
+{
+  std::string text = "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<executable>\n  <category>Ultrasound.Echorama</category>\n"
+                     "  <title>Echorama " +
+                     name + "</title>\n  <description>" + Xml(command.get_description()) +
+                     "</description>\n  <version>" ECHORAMA_VERSION "</version>\n  <license>BSD-3-Clause</license>\n"
+                     "  <contributor>The authors of Echorama</contributor>\n";
+  // Files first, as forms begin with what goes in and comes out.
+  int index = 0;
+  std::string files, others;
+  for (const CLI::Option* option : command.get_options(IsListed)) {
+    if (option->check_lname("json") || option->check_lname("threads"))
+      continue;
+    const std::string type = SlicerType(option);
+    (type == "image" || type == "file" || type == "directory" || option->get_positional() ? files : others) +=
+        SlicerParameter(option, index);
+  }
+  const auto group = [](const std::string& label, const std::string& parameters) {
+    return parameters.empty() ? std::string()
+                              : "  <parameters>\n    <label>" + label + "</label>\n    <description>" + label +
+                                    "</description>\n" + parameters + "  </parameters>\n";
+  };
+  return text + group("Input and output", files) + group("Parameters", others) + "</executable>\n";
+}
+
+std::string ManPage(const CLI::App& app, const std::string& name, const std::string& ending)
+{
+  std::string whole = name.empty() ? "echorama" : "echorama " + name, title = whole;
+  Replace(title, " ", "-");
+  std::string text = ".TH " + Troff(title) + " 1 \"\" \"echorama " ECHORAMA_VERSION "\" \"Echorama\"\n.SH NAME\n" + Troff(title) +
+                     " \\- " + Troff(app.get_description()) + "\n.SH SYNOPSIS\n\\fB" + Troff(whole) + "\\fR";
+  for (const CLI::Option* option : app.get_options(IsListed))
+    if (option->get_positional())
+      text += " \\fI" + Troff(option->get_name(true)) + "\\fR" + (IsMultiple(option) ? " ..." : "");
+  text += app.get_subcommands(All).empty() ? " [\\fIoptions\\fR]\n" : " \\fIcommand\\fR ...\n";
+  if (!app.get_subcommands(All).empty()) {
+    text += ".SH COMMANDS\n";
+    for (const CLI::App* each : app.get_subcommands(All))
+      text += ".TP\n\\fB" + Troff(each->get_name()) + "\\fR\n" + Troff(each->get_description()) + "\n" +
+              (name.empty() ? "" : ".RS\n" + TroffOptions(*each) + ".RE\n");
+  }
+  if (!name.empty())
+    text += ".SH OPTIONS\n" + TroffOptions(app);
+  return text + ".SH EXIT STATUS\n" + Troff(ending) + "\n" + (name.empty() ? "" : ".SH SEE ALSO\n.BR echorama (1)\n");
+}
+
+std::string BashCompletion(const CLI::App& program)
+{
+  std::string cases = BashCase(program, "");
+  for (const CLI::App* command : program.get_subcommands(All)) {
+    for (const CLI::App* each : command->get_subcommands(All))
+      cases += BashCase(*each, command->get_name() + " " + each->get_name());
+    cases += BashCase(*command, command->get_name());
+  }
+  return "# Completion of echorama in bash; made by echorama --completion.\n"
+         "_echorama() {\n"
+         "  local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]} options= names= values= kind=-f\n"
+         "  case \"${COMP_WORDS[*]:1:COMP_CWORD-1} \" in\n" +
+         cases +
+         "  esac\n"
+         "  if [[ $values ]]; then names=$values\n"
+         "  elif [[ $current == -* ]]; then names=$options; fi\n"
+         "  if [[ $names ]]; then mapfile -t COMPREPLY < <(compgen -W \"$names\" -- \"$current\")\n"
+         "  else mapfile -t COMPREPLY < <(compgen $kind -- \"$current\"); fi\n"
+         "}\n"
+         "complete -o filenames -F _echorama echorama\n";
+}
+
+} // namespace echorama
