@@ -2,6 +2,7 @@
 #include "SeenTissue.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
+#include "WideBeams.h"
 #include <algorithm>
 #include <array>
 #include <limits>
@@ -28,16 +29,23 @@ SeenTissue::SeenTissue(const AcousticScene& scene, const SynthesisParameters& p,
   SoundTransport direct = p.transport;
   direct.maxBounces = 0;
   const SoundTracer tracer(scene, direct, ConditionsOf(p));
+  std::optional<WideBeams> wide;
+  if (p.wideBeams)
+    wide.emplace(TraceWideBeams(scene, p, progress.Part(0.0, 0.9)));
   const Pose worldToProbe = probeToWorld_.inverse();
   beams_.resize(static_cast<std::size_t>(elements_) * static_cast<std::size_t>(steps_));
-  ParallelRanges(static_cast<std::ptrdiff_t>(beams_.size()), tracedPerRange, progress,
+  ParallelRanges(static_cast<std::ptrdiff_t>(beams_.size()), tracedPerRange, progress.Part(wide ? 0.9 : 0.0, 1.0),
                  [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
                    SoundPath path;
                    for (std::ptrdiff_t i = begin; i < end; ++i) {
                      const int element = static_cast<int>(i % elements_), step = static_cast<int>(i / elements_);
-                     RayStart axis = AxisOf(p, element, step);
-                     axis.inside = scene.BodiesAt(axis.origin);
-                     tracer.Trace(axis, path);
+                     if (wide) {
+                       path.segments = wide->HeardWay(i);
+                     } else {
+                       RayStart axis = AxisOf(p, element, step);
+                       axis.inside = scene.BodiesAt(axis.origin);
+                       tracer.Trace(axis, path);
+                     }
                      Beam& beam = beams_[static_cast<std::size_t>(i)];
                      BeamPoint shown = BeamOf(p, element, step);
                      beam.fan = shown.fan;

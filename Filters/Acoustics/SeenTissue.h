@@ -7,9 +7,9 @@ namespace echorama {
 /// Where a scanner sees tissue: the truth that goes with a synthesised volume.
 ///
 /// Sound bends, and its speed is not the one that the scanner assumes, so tissue is shown elsewhere than it is. The axis of every
-/// beam is followed along the direct way: at each of its bends it tells how far from where the scanner shows it something really
-/// lies. Along a beam, and between the four nearest beams at one scan depth, this displacement is taken as linear. Where a point
-/// is seen is found by a damped fixed-point iteration, to 1e-6 mm.
+/// beam, or the middle of a wide one, is followed along the direct way: at each of its bends it tells how far from where the
+/// scanner shows it something really lies. Along a beam, and between the four nearest beams at one scan depth, this displacement
+/// is taken as linear. Where a point is seen is found by a damped fixed-point iteration, to 1e-6 mm.
 ///
 /// With stepPoses each plane shows what lies where the probe was.
 class SeenTissue {

@@ -18,6 +18,7 @@
 #include "EchoSum.h"
 #include "Scatterers.h"
 #include "VisitedSpace.h"
+#include "WideBeams.h"
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -51,41 +52,23 @@ private:
 
 // What the third pass needs of a beam.
 struct BeamWays {
+  struct Lobe {
+    std::vector<SoundSegment> segments;
+    std::vector<SurfaceEcho> echoes;
+  };
   std::vector<SoundSegment> segments;
   std::vector<SurfaceEcho> echoes;
+  std::vector<Lobe> lobes;            // beside the main one
   std::vector<float> directAmplitude; // by depth sample, when several rays were averaged; the direct segments are then bare
 };
 
 std::size_t BytesOf(const BeamWays& ways)
 {
-  return ways.segments.capacity() * sizeof(SoundSegment) + ways.echoes.capacity() * sizeof(SurfaceEcho) +
-         ways.directAmplitude.capacity() * sizeof(float);
-}
-
-// The ray of a beam's axis turned into one of several over the aperture, which meet at the focus at one time.
-RayStart SubRayOf(const RayStart& axis, const Transducer& transducer, RaySamples& samples)
-{
-  RayStart start = axis;
-  const double lateral = (samples.Next() - 0.5) * transducer.lateralApertureMm,
-               elevation = (samples.Next() - 0.5) * transducer.elevationApertureMm;
-  const Vector3d out = axis.direction.cross(axis.across);
-  const Vector3d focus = axis.origin + transducer.lateralFocusMm * axis.direction;
-  start.origin += lateral * axis.across + elevation * out;
-  const double way = (focus - start.origin).norm();
-  start.direction = (focus - start.origin) / way;
-  start.across = (axis.across - axis.across.dot(start.direction) * start.direction).normalized();
-  start.scanDepth = transducer.lateralFocusMm - way; // the same time at the focus
-  return start;
-}
-
-// How much a ray from that part of the aperture counts: its apodisation.
-double WeightOf(const RayStart& start, const RayStart& axis, const Transducer& transducer)
-{
-  const Vector3d offset = start.origin - axis.origin;
-  const double lateral = offset.dot(axis.across) / (transducer.lateralApertureMm / Transducer::sigmasPerAperture),
-               elevation = offset.dot(axis.direction.cross(axis.across)) /
-                           (transducer.elevationApertureMm / Transducer::sigmasPerAperture);
-  return std::exp(-0.5 * (lateral * lateral + elevation * elevation));
+  std::size_t bytes = ways.segments.capacity() * sizeof(SoundSegment) + ways.echoes.capacity() * sizeof(SurfaceEcho) +
+                      ways.directAmplitude.capacity() * sizeof(float);
+  for (const BeamWays::Lobe& lobe : ways.lobes)
+    bytes += lobe.segments.capacity() * sizeof(SoundSegment) + lobe.echoes.capacity() * sizeof(SurfaceEcho);
+  return bytes;
 }
 
 // Adds the amplitude of the direct way to a function of depth.
@@ -106,7 +89,8 @@ class Beams {
 public:
   Beams(const AcousticScene& scene, const SynthesisParameters& p)
     : scene_(scene), p_(p), n_(p.BeamDimensions()), axis_(InternalAxis(p)), tracer_(scene, p.transport, ConditionsOf(p)),
-      brightestDb_(Material::clearDb), leastDb_(-p.receiver.dynamicRangeDb * p.receiver.referenceGrey / 255.0 - p.invisibleDb)
+      lobes_(LobesOf(p.lobes, p.transducer)), brightestDb_(Material::clearDb),
+      leastDb_(-p.receiver.dynamicRangeDb * p.receiver.referenceGrey / 255.0 - p.invisibleDb)
   {
     for (const Material& material : scene.Materials())
       brightestDb_ = std::max(brightestDb_, material.backscatterDb);
@@ -127,7 +111,8 @@ public:
   const DepthAxis& Axis() const { return axis_; }
   std::ptrdiff_t Count() const { return static_cast<std::ptrdiff_t>(n_[1]) * n_[2]; }
 
-  BeamWays Trace(std::ptrdiff_t beam, std::int64_t& rays) const
+  // \param wide takes what the rays tell of the direct way, if there is one
+  BeamWays Trace(std::ptrdiff_t beam, WideBeams* wide, std::int64_t& rays) const
   {
     RayStart axis = AxisOf(p_, static_cast<int>(beam % n_[1]), static_cast<int>(beam / n_[1]));
     axis.inside = scene_.BodiesAt(axis.origin);
@@ -136,6 +121,7 @@ public:
     RaySamples ofAxis(Sampling::Random, p_.seed, static_cast<std::uint64_t>(beam % n_[1]), 0, 1); // however many rays there are
     tracer_.Trace(axis, path, &ofAxis);
     rays += path.rays;
+    TraceLobes(axis, static_cast<std::uint64_t>(beam % n_[1]), ways, rays);
     const bool alone = p_.subRays == 1;
     if (!alone)
       MakeBare(axis, path.segments);
@@ -143,30 +129,28 @@ public:
                  [&](const SoundSegment& segment) { return (segment.bounces == 0 && !alone) || IsVisible(segment); });
     ways.segments.shrink_to_fit();
     if (alone) {
+      if (wide)
+        wide->Add(beam, {axis, 1.0, ofAxis}, path);
       ways.echoes = path.echoes;
       return ways;
     }
 
     ways.directAmplitude.assign(static_cast<std::size_t>(axis_.count), 0.0f);
-    std::vector<RaySamples> all;
-    std::vector<RayStart> starts;
+    std::vector<ApertureRay> all = RaysOf(p_, static_cast<int>(beam % n_[1]), axis);
     double sum = 0.0;
-    for (int ray = 0; ray < p_.subRays; ++ray) {
-      all.push_back(SamplesOf(beam, ray));
-      starts.push_back(SubRayOf(axis, p_.transducer, all.back()));
-      sum += WeightOf(starts.back(), axis, p_.transducer);
-    }
-    for (int ray = 0; ray < p_.subRays; ++ray) {
-      RaySamples& samples = all[static_cast<std::size_t>(ray)];
-      RayStart& start = starts[static_cast<std::size_t>(ray)];
-      start.inside = scene_.BodiesAt(start.origin);
-      const double weight = WeightOf(start, axis, p_.transducer);
-      start.leastReflected = leastEcho_ * sum / weight;
-      tracer_.Trace(start, path, &samples);
+    for (const ApertureRay& ray : all)
+      sum += ray.weight;
+    for (ApertureRay& ray : all) {
+      ray.start.inside = scene_.BodiesAt(ray.start.origin);
+      ray.start.leastReflected = leastEcho_ * sum / ray.weight;
+      tracer_.Trace(ray.start, path, &ray.samples);
       rays += path.rays;
-      AddDirect(path, weight, axis_, ways.directAmplitude);
+      if (wide)
+        wide->Add(beam, ray, path);
+      else
+        AddDirect(path, ray.weight, axis_, ways.directAmplitude);
       for (SurfaceEcho echo : path.echoes) {
-        echo.amplitude *= weight;
+        echo.amplitude *= ray.weight;
         ways.echoes.push_back(echo);
       }
     }
@@ -175,6 +159,17 @@ public:
     for (float& amplitude : ways.directAmplitude)
       amplitude /= static_cast<float>(sum);
     return ways;
+  }
+
+  // The direct way becomes that of the beam as a whole.
+  void Widen(std::ptrdiff_t beam, const WideBeams& wide, BeamWays& ways) const
+  {
+    WideWay way = wide.Way(beam);
+    ways.directAmplitude = wide.AmplitudeAt(way, axis_);
+    std::copy_if(ways.segments.begin(), ways.segments.end(), std::back_inserter(way.segments),
+                 [](const SoundSegment& segment) { return segment.bounces > 0; });
+    ways.segments = std::move(way.segments);
+    ways.segments.shrink_to_fit();
   }
 
   // Gives the direct way amplitude 1, and lets it go straight on from where it ends: rays beside it may get further.
@@ -203,10 +198,21 @@ public:
       segments.insert(end, on);
   }
 
-  EchoSum Summer(const Scatterers& scatterers) const { return {scatterers, p_.transducer, axis_}; }
+  const std::vector<BeamLobe>& Lobes() const { return lobes_; }
 
-  void Sum(const BeamWays& ways, EchoSum& echoes, Complex* row) const
+  // Of the main lobe, and of each other.
+  std::vector<EchoSum> Summers(const Scatterers& scatterers) const
   {
+    std::vector<EchoSum> sums;
+    sums.emplace_back(scatterers, p_.transducer, axis_);
+    for (const BeamLobe& lobe : lobes_)
+      sums.emplace_back(scatterers, lobe.transducer, axis_);
+    return sums;
+  }
+
+  void Sum(const BeamWays& ways, std::vector<EchoSum>& sums, Complex* row) const
+  {
+    EchoSum& echoes = sums.front();
     // The direct way comes first.
     auto segment = ways.segments.begin();
     for (; segment != ways.segments.end() && segment->bounces == 0; ++segment)
@@ -222,9 +228,46 @@ public:
     const double mirror = std::pow(10.0, p_.mirrorDb / 20.0);
     for (const SurfaceEcho& echo : ways.echoes)
       AddSurfaceEcho(echo, p_.transducer, axis_, row, mirror);
+    for (std::size_t i = 0; i < ways.lobes.size(); ++i) {
+      for (const SoundSegment& each : ways.lobes[i].segments)
+        sums[i + 1].Add(each);
+      sums[i + 1].MoveTo(row);
+      for (const SurfaceEcho& echo : ways.lobes[i].echoes)
+        AddSurfaceEcho(echo, lobes_[i].transducer, axis_, row, mirror);
+    }
   }
 
 private:
+  // One ray of every lobe. An EchoSum's speckle is as loud whatever the beam's width and its pulse's length; that of a lobe shall
+  // be as loud as its pattern, its width and its length beside those of the main lobe make it.
+  void TraceLobes(const RayStart& axis, std::uint64_t element, BeamWays& ways, std::int64_t& rays) const
+  {
+    SoundPath path;
+    for (std::size_t i = 0; i < lobes_.size(); ++i) {
+      const BeamLobe& lobe = lobes_[i];
+      RayStart start = axis;
+      const double cosine = std::sqrt(1.0 - lobe.sine * lobe.sine);
+      start.direction = cosine * axis.direction + lobe.sine * axis.across;
+      start.across = cosine * axis.across - lobe.sine * axis.direction;
+      start.amplitude = lobe.amplitude;
+      RaySamples samples(Sampling::Random, p_.seed, element, static_cast<std::uint32_t>(i + 1),
+                         static_cast<std::uint32_t>(lobes_.size() + 1));
+      tracer_.Trace(start, path, &samples);
+      rays += path.rays;
+      BeamWays::Lobe& of = ways.lobes.emplace_back();
+      of.echoes = path.echoes;
+      const double longer = lobe.transducer.PulseSigmaMm() / p_.transducer.PulseSigmaMm();
+      for (SoundSegment segment : path.segments) {
+        const double way = segment.way + 0.5 * segment.length;
+        segment.amplitude *=
+            std::sqrt(longer * WidthAt(lobe.transducer, way).lateralSigma / WidthAt(p_.transducer, way).lateralSigma);
+        if (IsVisible(segment))
+          of.segments.push_back(segment);
+      }
+      of.segments.shrink_to_fit();
+    }
+  }
+
   // Whether the speckle of the brightest material would show. Amplitude and gain change by constant numbers of dB per mm
   // between the points of the gain, so one of those or an end is the brightest place.
   bool IsVisible(const SoundSegment& segment) const
@@ -242,18 +285,12 @@ private:
            });
   }
 
-  RaySamples SamplesOf(std::ptrdiff_t beam, int ray) const
-  {
-    // By element alone, so that one plane has the same rays by itself and within its sweep.
-    return {p_.sampling, p_.seed, static_cast<std::uint64_t>(beam % n_[1]), static_cast<std::uint32_t>(ray),
-            static_cast<std::uint32_t>(p_.subRays)};
-  }
-
   const AcousticScene& scene_;
   const SynthesisParameters& p_;
   std::array<int, 3> n_;
   DepthAxis axis_;
   SoundTracer tracer_;
+  std::vector<BeamLobe> lobes_;
   double brightestDb_; // of all materials
   double leastDb_;     // below this nothing shows
   double leastEcho_;   // amplitude of which a perfect mirror's echo is hidden: in the noise, or below black after all gain
@@ -266,16 +303,24 @@ double Reach(const SoundSegment& segment, const Transducer& transducer)
   return beamReach * std::max({from.lateralSigma, from.elevationSigma, to.lateralSigma, to.elevationSigma});
 }
 
-VisitedSpace SpaceOf(const std::vector<BeamWays>& beams, const Transducer& transducer, const Progress& progress)
+VisitedSpace SpaceOf(const std::vector<BeamWays>& beams, const Transducer& transducer, const std::vector<BeamLobe>& lobes,
+                     const Progress& progress)
 {
+  const auto eachOf = [&](const BeamWays& ways, const auto& visit) {
+    for (const SoundSegment& segment : ways.segments)
+      visit(segment, Reach(segment, transducer));
+    for (std::size_t i = 0; i < ways.lobes.size(); ++i)
+      for (const SoundSegment& segment : ways.lobes[i].segments)
+        visit(segment, Reach(segment, lobes[i].transducer));
+  };
   Eigen::AlignedBox3d box;
   double reach = 0.0;
   for (const BeamWays& ways : beams)
-    for (const SoundSegment& segment : ways.segments) {
+    eachOf(ways, [&](const SoundSegment& segment, double itsReach) {
       box.extend(segment.from);
       box.extend(segment.from + segment.length * segment.direction);
-      reach = std::max(reach, Reach(segment, transducer));
-    }
+      reach = std::max(reach, itsReach);
+    });
   if (!box.isEmpty()) {
     box.min().array() -= reach;
     box.max().array() += reach;
@@ -284,8 +329,9 @@ VisitedSpace SpaceOf(const std::vector<BeamWays>& beams, const Transducer& trans
   ParallelRanges(static_cast<std::ptrdiff_t>(beams.size()), beamsPerRange, progress,
                  [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
                    for (std::ptrdiff_t beam = begin; beam < end; ++beam)
-                     for (const SoundSegment& segment : beams[static_cast<std::size_t>(beam)].segments)
-                       space.MarkLine(segment.from, segment.direction, segment.length, Reach(segment, transducer));
+                     eachOf(beams[static_cast<std::size_t>(beam)], [&](const SoundSegment& segment, double itsReach) {
+                       space.MarkLine(segment.from, segment.direction, segment.length, itsReach);
+                     });
                  });
   return space;
 }
@@ -347,10 +393,14 @@ ParameterList Describe(EchoModel& m)
                           "Coherent: the echoes of scatterers are summed with their phases. Counting: random scatter events of "
                           "rays are counted (dissertation 3.4).")},
                Describe(m.transport),
+               Describe(m.lobes),
                {Parameter("SubRays", m.subRays, {1, 4096}, "",
                           "Rays of an element, spread over its aperture. 1: the axis alone, fast and hard-edged.")
                     .Advanced(),
                 Parameter("Sampling", Choice(m.sampling, SamplingNames), "How the rays of an element are spread.").Advanced(),
+                Parameter("WideBeams", m.wideBeams,
+                          "Whether a beam is bent and shaded as a whole, by the mean of its rays and of those of its neighbours "
+                          "within its width; off: bent along its axis alone. Used when Mode is coherent."),
                 Parameter("MirrorDb", m.mirrorDb, {0, 120}, "dB",
                           "Level of the echo of a perfect mirror, square to the beam, beside the mean speckle of the reference "
                           "tissue.")
@@ -451,10 +501,18 @@ BeamEchoes SynthesizeEchoes(const AcousticScene& scene, const SynthesisParameter
   {
     const Stopwatch watch(&spent.raysSeconds);
     std::vector<std::int64_t> rays(ways.size(), 0);
-    ParallelRanges(wanted, beamsPerRange, progress.Part(0.0, 0.2), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    std::optional<WideBeams> wide;
+    if (p.wideBeams)
+      wide.emplace(p);
+    ParallelRanges(wanted, beamsPerRange, progress.Part(0.0, 0.19), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
       for (std::ptrdiff_t i = first + begin; i < first + end; ++i)
-        ways[static_cast<std::size_t>(i)] = beams.Trace(i, rays[static_cast<std::size_t>(i)]);
+        ways[static_cast<std::size_t>(i)] = beams.Trace(i, wide ? &*wide : nullptr, rays[static_cast<std::size_t>(i)]);
     });
+    if (wide)
+      ParallelRanges(wanted, beamsPerRange, progress.Part(0.19, 0.2), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+        for (std::ptrdiff_t i = first + begin; i < first + end; ++i)
+          beams.Widen(i, *wide, ways[static_cast<std::size_t>(i)]);
+      });
     for (const std::int64_t each : rays)
       spent.rays += each;
   }
@@ -467,7 +525,7 @@ BeamEchoes SynthesizeEchoes(const AcousticScene& scene, const SynthesisParameter
 
   const auto scatterers = [&] {
     const Stopwatch watch(&spent.scatterersSeconds);
-    const VisitedSpace space = SpaceOf(ways, p.transducer, progress.Part(0.2, 0.22));
+    const VisitedSpace space = SpaceOf(ways, p.transducer, beams.Lobes(), progress.Part(0.2, 0.22));
     ScattererParameters parameters;
     parameters.seed = p.seed;
     parameters.densityPerMm3 = p.ScatterersPerMm3();
@@ -487,9 +545,9 @@ BeamEchoes SynthesizeEchoes(const AcousticScene& scene, const SynthesisParameter
     const Stopwatch watch(&spent.echoesSeconds);
     const VolumeView<Complex> rows = echoes.baseband.View();
     ParallelRanges(wanted, beamsPerRange, progress.Part(0.4, 1.0), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-      EchoSum sum = beams.Summer(scatterers);
+      std::vector<EchoSum> sums = beams.Summers(scatterers);
       for (std::ptrdiff_t i = first + begin; i < first + end; ++i)
-        beams.Sum(ways[static_cast<std::size_t>(i)], sum, rows.Row(static_cast<int>(i % n[1]), static_cast<int>(i / n[1])));
+        beams.Sum(ways[static_cast<std::size_t>(i)], sums, rows.Row(static_cast<int>(i % n[1]), static_cast<int>(i / n[1])));
     });
   }
   spent.bytes = bytes + static_cast<std::size_t>(samples) * sizeof(Complex);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "AcousticScene.h"
+#include "BeamLobes.h"
 #include "Core/Base/Progress.h"
 #include "Core/Geometry/Transducer.h"
 #include "Core/Imaging/BeamEchoes.h"
@@ -27,6 +28,8 @@ struct EchoModel {
   SoundTransport transport;
   int subRays = 8;
   Sampling sampling = Sampling::Stratified; ///< also of how rough surfaces scatter rays
+  bool wideBeams = false;                   ///< see WideBeams
+  BeamLobes lobes;
   double mirrorDb = 45.0;
   ScatterCounting counting; ///< of the mode Counting
 };
@@ -107,10 +110,11 @@ struct SynthesisCost {
 ///    aperture (subRays). 2. Scatterers are made where those ways pass, nowhere else. 3. Each beam sums the
 /// echoes of the scatterers around its ways, and of the surfaces that it meets. With several rays the ways of the axis stand for
 /// the beam, the direct one with the mean amplitude of all rays at each depth: the edge of a shadow is as soft as the aperture is
-/// wide. Surfaces echo to every ray, by its share.
-/// The result does not depend on the number of threads.
-/// \param cache of scatterers from earlier calls for this scene, if any; it changes nothing but the time
-/// \throws as Check(); Error(TooLarge) when samples or scatterers would not fit; Error(Cancelled).
+/// wide. Surfaces echo to every ray, by its share. Wide beams go their own way, that of all their rays and of their neighbours'.
+/// Side and grating lobes, if there are any, are further beams of an element, weak and aside: one ray each, whose ways and
+/// surfaces echo as those of the main lobe, by the lobe's pattern. The result does not depend on the number of threads. \param
+/// cache of scatterers from earlier calls for this scene, if any; it changes nothing but the time \throws as Check();
+/// Error(TooLarge) when samples or scatterers would not fit; Error(Cancelled).
 BeamEchoes SynthesizeEchoes(const AcousticScene& scene, const SynthesisParameters& parameters, const Progress& progress = {},
                             SynthesisCost* cost = nullptr, ScattererCache* cache = nullptr);
 

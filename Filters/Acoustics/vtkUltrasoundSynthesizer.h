@@ -222,6 +222,40 @@ public:
   ///@}
 
   /**
+   * Whether a beam is bent and shaded as a whole, by the mean of its rays and of those of its neighbours within its width; off:
+   * bent along its axis alone. Used when Mode is coherent. Default off.
+   */
+  vtkUltrasoundSwitchMacro(WideBeams);
+
+  /**
+   * Side lobes on either side of each beam along the fan; each costs about as much as the beam itself. 0: none. In [0, 20];
+   * default 0.
+   */
+  vtkUltrasoundIntegerMacro(SideLobes);
+
+  enum Apodisations { RECTANGULAR = 0, HANN = 1, GAUSSIAN = 2 };
+
+  ///@{
+  /**
+   * What side and grating lobes are those of: rectangular has loud side lobes, hann and gaussian (a fifth of the aperture) faint
+   * ones. Default hann. There are RECTANGULAR, HANN, GAUSSIAN.
+   */
+  vtkUltrasoundChoiceMacro(Apodisation);
+  void SetApodisationToRectangular() { this->SetApodisation(RECTANGULAR); }
+  void SetApodisationToHann() { this->SetApodisation(HANN); }
+  void SetApodisationToGaussian() { this->SetApodisation(GAUSSIAN); }
+  ///@}
+
+  /**
+   * From element to element of the array. Grating lobes lie where its sine of the angle is a multiple of wavelength / pitch. 0:
+   * no grating lobes. In [0, 10] mm; default 0.
+   */
+  vtkUltrasoundNumberMacro(PitchMm);
+
+  /** How wide an element is; narrow ones hear more of grating lobes. In [0.01, 1] pitches; default 0.9. */
+  vtkUltrasoundNumberMacro(ElementWidth);
+
+  /**
    * Level of the echo of a perfect mirror, square to the beam, beside the mean speckle of the reference tissue. In [0, 120] dB;
    * default 45.
    */

@@ -218,6 +218,7 @@ TEST(SeenTissue, ABallIsReallySeenThere)
     p.samples = 200;
     p.scatterersPerMm3 = 100.0;
     p.transducer.lateralFocusMm = p.transducer.elevationFocusMm = 40.0;
+    p.wideBeams = centre.x() > 0.0;
     // The middle of the power of the ball's echoes, over several draws of its scatterers.
     Vector3d sum = Vector3d::Zero();
     double power = 0.0;
