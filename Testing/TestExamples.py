@@ -45,7 +45,7 @@ with tempfile.TemporaryDirectory() as folder:
                               (["shell_figures.py", "--resolution", "1", pictures], ["shell"]),
                               (["live_image_figures.py", "--spacing", "1.5", pictures], ["live_image"]),
                               (["live_scene_figures.py", "--detail", "5", "--cells", "10", pictures], ["live_scene"]),
-                              (["synthesis_mode_figures.py", "--quick", pictures], ["Synthesizer", "SynthesizerClarity"]),
+                              (["synthesis_mode_figures.py", "--quick", pictures], ["Synthesizer", "SynthesizerClarity", "SynthesizerBeams"]),
                               (["synthesis_tissue_figures.py", pictures], ["TissueSource", "TissueSourceLevels"]),
                               (["pressing_figures.py", "--quick", "--sph", build / "benchmarks" / "BenchmarkSph", pictures],
                                ["Gel", "TissuePress", "Moving", "sph_block", "sph_bodies", "sph_gel"]),

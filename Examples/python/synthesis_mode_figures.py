@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Figures of the synthesizer: both modes side by side, and what the clarity of counted events changes.
+"""Figures of the synthesizer: both modes side by side, what the clarity of counted events changes, and wide beams and their lobes.
 
-synthesis_mode_figures.py FOLDER [--quick]
+synthesis_mode_figures.py FOLDER [--quick] [--scan SEQUENCE]
 """
 import argparse
 import pathlib
@@ -30,10 +30,16 @@ def synthesizer_of(source, position, quick):
     return synthesizer
 
 
+def grey_of(image):
+    return vtk_to_numpy(image.GetPointData().GetArray("Intensity")).reshape(image.GetDimensions()[::-1]).squeeze()
+
+
 def picture(axes, synthesizer, title):
     synthesizer.Update()
-    image = synthesizer.GetOutput()
-    grey = vtk_to_numpy(image.GetPointData().GetArray("Intensity")).reshape(image.GetDimensions()[::-1]).squeeze()
+    show(axes, grey_of(synthesizer.GetOutput()), title)
+
+
+def show(axes, grey, title):
     axes.imshow(grey, cmap="gray", vmin=0, vmax=255)
     axes.set_title(title)
     axes.axis("off")
@@ -43,6 +49,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("--quick", action="store_true", help="coarse pictures, for tests")
+    parser.add_argument("--scan", type=pathlib.Path, help="a tracked sequence, of which a frame is shown beside wide beams")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
 
@@ -68,6 +75,24 @@ def main():
         picture(axes, synthesizer, f"clarity {clarity}")
     figure.tight_layout()
     figure.savefig(options.folder / "SynthesizerClarity.png", dpi=60)
+
+    figure, row = plt.subplots(1, 4 if options.scan else 3, figsize=(20 if options.scan else 15, 4.4))
+    synthesizer = synthesizer_of(*scenes[1][:2], options.quick)
+    synthesizer.SetTgcDbPerCm(3.5)
+    for axes, (wide, lobes, title) in zip(row, ((False, 0, "beams along their axes"), (True, 0, "wide beams"),
+                                                (True, 4, "wide beams, side and grating lobes"))):
+        synthesizer.SetWideBeams(wide)
+        synthesizer.SetSideLobes(lobes)
+        synthesizer.SetApodisationToRectangular()
+        synthesizer.SetPitchMm(0.6 if lobes else 0)
+        picture(axes, synthesizer, title)
+    if options.scan:
+        reader = echorama.vtkUltrasoundSequenceReader()
+        reader.SetFileName(str(options.scan))
+        reader.Update()
+        show(row[3], grey_of(reader.GetOutputDataObject(0)), "a liver, in vivo")
+    figure.tight_layout()
+    figure.savefig(options.folder / "SynthesizerBeams.png", dpi=60)
 
 
 if __name__ == "__main__":
