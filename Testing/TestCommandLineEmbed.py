@@ -98,7 +98,7 @@ class Embed(unittest.TestCase):
             return told, first, *(read_mha(self.folder / f"cubed{name}.mha")[1] for name in ("", ".Embedding"))
 
         for margin, feather, outside, inside, options in (
-                (5, 3, 4, 6, ()), (9, 5, 1, 2, ("--margin", 9, "--feather", 5, "--outside-exponent", 1, "--inside-exponent", 2))):
+                (5, 3, 4, 6, ("--margin", 5, "--feather", 3)), (9, 5, 1, 2, ("--margin", 9, "--feather", 5, "--outside-exponent", 1, "--inside-exponent", 2))):
             told, first, grey, labels = embedded("--smooth", 0.001, *options)
             probe = told["ProbeGeometry"]
             side = 14 + 2 * margin
@@ -114,6 +114,12 @@ class Embed(unittest.TestCase):
             for x in range(7, 6 + feather - 1):  # behind the surface
                 place, weight = np.array([11, 12, x]), (x - 5) / feather
                 self.assertAlmostEqual(grey[tuple(place + first)], weight * 100 + (1 - weight) * spread(place, inside), delta=0.8, msg=f"{x}")
+
+        # By themselves margin and feather follow the data: a fortieth of 13 mm, and four voxels are more than 3 mm.
+        told, first, grey, labels = embedded("--smooth", 0.001)
+        self.assertAlmostEqual(told["ProbeGeometry"]["depth_mm"][1], 14 + 2 * 13 / 40, delta=1e-3)
+        self.assertEqual(told["feather_mm"], 3)
+        self.assertEqual(told["voxels_data"], 10**3)
 
         # Every third voxel, from the second: the middle of three.
         told, first, grey, labels = embedded("--preview", 3)
@@ -131,13 +137,39 @@ class Embed(unittest.TestCase):
         told, _, grey, labels = embedded("--smooth", 1000, "--no-contrast")
         self.assertGreater(grey[labels == 3].std(), 1.5 * real.std())
 
+    def test_it_says_when_there_is_too_little_speckle(self):
+        """Water with a wall: no speckle at all. The note tells what to do, and the background is made nevertheless."""
+        voxels = np.zeros((40, 44, 48), np.uint8)
+        voxels[30:32] = 220
+        write_mha(self.folder / "water.mha", voxels)
+        write_mha(self.folder / "water.ValidRegion.mha", np.ones_like(voxels))
+        done = run("embed", self.folder / "water.mha", "-o", self.folder / "wet.mha")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for words in ("too little speckle", "noise volumes of the same scanner"):
+            self.assertIn(words, done.stdout + done.stderr)
+        told = run_json("embed", self.folder / "water.mha", "-o", self.folder / "wet.mha")
+        self.assertFalse(told["enough_speckle"])
+        self.assertEqual(told["speckle_grains"], 0)
+        self.assertEqual(told["ProbeGeometry"]["fan_degrees"], 0)
+        # A volume of speckle has enough, and says nothing of the kind.
+        done = run("embed", self.stitched, "-o", self.folder / "fine.mha", "--outline", "linear", "--json")
+        told = json.loads(done.stdout)
+        self.assertTrue(told["enough_speckle"])
+        self.assertGreater(told["speckle_grains"], 400)
+        self.assertNotIn("too little speckle", done.stdout + done.stderr)
+        self.assertEqual((told["ProbeGeometry"]["fan_degrees"], told["ProbeGeometry"]["sweep_degrees"]), (0, 0))
+        found = run_json("embed", self.stitched, "-o", self.folder / "fine.mha")
+        self.assertGreater(found["ProbeGeometry"]["fan_degrees"], 10)
+        self.assertLess(found["voxels_invented"], told["voxels_invented"])
+
     def test_what_is_refused(self):
         nothing = self.folder / "nothing.mha"
         write_mha(nothing, np.zeros((20, 20, 20), np.uint8))
         before = snapshot(self.folder)
         for status, arguments, words in (
                 (2, (self.stitched,), ("output",)),
-                (2, (self.stitched, "-o", self.folder / "a.mha", "--feather", "-1"), ("feather",)),
+                (2, (self.stitched, "-o", self.folder / "a.mha", "--feather", "-2"), ("feather",)),
+                (2, (self.stitched, "-o", self.folder / "a.mha", "--outline", "round"), ("outline",)),
                 (2, (self.stitched, "-o", self.folder / "a.mha", "--preview", "0"), ("preview",)),
                 (2, (self.stitched, "-o", self.folder / "a.xyz"), ("a.xyz",)),
                 (1, (self.stitched, "-o", self.stitched), ("stitched.mha",)),

@@ -50,7 +50,7 @@ with tempfile.TemporaryDirectory() as folder:
                               (["pressing_figures.py", "--quick", "--sph", build / "benchmarks" / "BenchmarkSph", pictures],
                                ["Gel", "TissuePress", "Moving", "sph_block", "sph_bodies", "sph_gel"]),
                               (["embedding_figures.py", "--spacing", "3", pictures],
-                               ["embedding_coverage", "embedding_background", "embedding_ways"])):
+                               ["embedding_coverage", "embedding_background", "embedding_ways", "embedding_outlines"])):
         answer = subprocess.run(["/usr/bin/python3", source / "Examples" / "python" / arguments[0], *arguments[1:]], cwd=folder,
                                 capture_output=True, text=True)
         print(answer.stdout, answer.stderr, sep="")

@@ -149,7 +149,8 @@ QWidget* ResultPanel::MoreFields()
       [this](const char* name, const std::string& text) { SetParameter(recipe_.Stitching(), name, text); }, box);
   embedMore_ = new ParameterPanel(
       [this] { return recipe_.Embedding(); },
-      Controls{{"FeatherMm", tr("Feather"), 0.0, 15.0},
+      Controls{{"FeatherMm", tr("Feather"), -1.0, 15.0, tr("automatic")},
+               {"Outline", tr("Kind of outline")},
                {"KeepTexture", tr("Keep texture")},
                {"SmoothMm", tr("Smoothing"), 0.5, 20.0},
                {"MatchGrain", tr("Match grain")},

@@ -76,6 +76,12 @@ void Embed(Session& session, const EmbedOptions& options, vtkUltrasoundEmbedder*
   session.result["voxels_data"] = count(EmbeddedVoxel::Data);
   session.result["voxels_blend"] = count(EmbeddedVoxel::Blend);
   session.result["voxels_invented"] = count(EmbeddedVoxel::Invented);
+  session.result["feather_mm"] = embedder->GetUsedFeatherMm();
+  if (embedder->GetSpeckleGrains() >= 0.0) {
+    session.result["speckle_grains"] = embedder->GetSpeckleGrains();
+    session.result["speckle_share"] = embedder->GetSpeckleShare();
+  }
+  session.result["enough_speckle"] = embedder->GetEnoughSpeckle();
   session.result["report"] = LinesOf(embedder->GetNotes());
   session.Say("wrote " + options.output + ": " + SizeText(geometry.dimensions) + " voxels of " +
               Triple(geometry.spacing, " x ", 3) + " mm");
@@ -85,6 +91,7 @@ void Embed(Session& session, const EmbedOptions& options, vtkUltrasoundEmbedder*
   const auto share = [&](EmbeddedVoxel kind) { return Fixed(100.0 * static_cast<double>(count(kind)) / shown, 1) + "%"; };
   session.Say("  inside      " + share(EmbeddedVoxel::Data) + " data, " + share(EmbeddedVoxel::Blend) +
               " data mixed with background, " + share(EmbeddedVoxel::Invented) + " invented background");
+  session.Say("  feather     " + Fixed(embedder->GetUsedFeatherMm(), 2) + " mm");
   for (const std::string& line : LinesOf(embedder->GetNotes()))
     session.Say("  " + line);
 }
@@ -109,6 +116,7 @@ void EchoramaCommand(CLI::App* options, Action& action)
     options->add_flag(asItIs)->group(""); // accepted, and not listed
   AddParameter(options, embedder, "FeatherMm", "--feather");
   AddParameter(options, embedder, "MarginMm", "--margin");
+  AddParameter(options, embedder, "Outline");
   AddParameter(options, embedder, "SmoothMm", "--smooth");
   AddParameters(options, embedder, {"InsideExponent", "OutsideExponent"});
   AddParameter(options, embedder, "OverlapDegrees", "--overlap");

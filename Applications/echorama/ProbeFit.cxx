@@ -75,6 +75,7 @@ void EchoramaCommand(CLI::App* options, Action& action)
   AddParameters(options, filter, {"MinimumOverlap", "MaximumDistance"});
   CLI::Option* enclose = AddParameter(options, filter, "EncloseRegion", "--enclose");
   AddParameter(options, filter, "MarginMm", "--margin")->needs(enclose);
+  AddParameter(options, filter, "Outline")->needs(enclose);
   action = [values, filter](Session& session) { FitProbe(session, *values, filter); };
 }
 

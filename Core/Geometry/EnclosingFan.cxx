@@ -9,7 +9,9 @@
 // 3. Starts: the shape that is given or the fit of the region, and plain fans along the same axes, from flat to well bent. A flat
 //    one can enclose anything, so that there is always an answer. The given one and the best two plain ones are improved by the
 //    simplex method of Nelder and Mead: the volume of the fan has kinks, where the outermost voxel changes.
-// 4. The extremes over all voxels of the surface make the fan.
+// 4. Boxes, from the axes of the fit and of the grid, and phased fans, from where the beams of the fit meet, are searched in the
+//    same way with their bends held at 0 and at 1.
+// 5. The extremes over all voxels of the surface make the fan.
 //
 // A bend is written as b in [0, 1], 0 flat and 1 a point: (1 - b) of the width halfway down is there at the face, and b comes
 // with depth. Neither end is infinite, and across the beams the unit is a millimetre at that depth.
@@ -31,8 +33,10 @@ constexpr double widestTurn = 85.0 * Pi / 180.0; // of a beam, from the middle o
 constexpr int blocksAlong = 16;                  // the longest side of the region, for the points of the search
 constexpr std::size_t mostPoints = 700;
 constexpr double asGoodAsInside = 0.01; // voxels
-constexpr double flatBend = 1e-9;       // less is flat
-constexpr double slack = 1e-7;          // that extremes are widened by, as a part of the fan's size: rounding
+constexpr double asSmall = 0.05;        // of the volume: a simpler family may be so much larger than another
+constexpr double mostMargin = 5.0, marginParts = 40.0;
+constexpr double flatBend = 1e-9; // less is flat
+constexpr double slack = 1e-7;    // that extremes are widened by, as a part of the fan's size: rounding
 
 // Calls body(i, j, k) for the voxels of slice k that are on the surface of the region.
 template <class Body>
@@ -76,6 +80,7 @@ struct ValidVoxels {
   VolumeView<const unsigned char> valid;
   ImageGeometry geometry;
   bool plane = false;
+  double margin = 0.0; // mm
   double beyond = 0.0; // mm around each voxel centre that are enclosed too
   std::vector<Eigen::Vector3d> points;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
@@ -85,9 +90,8 @@ struct ValidVoxels {
 ValidVoxels RegionOf(VolumeView<const unsigned char> valid, const ImageGeometry& geometry, double marginMm,
                      const Progress& progress)
 {
-  ValidVoxels region{valid, geometry, geometry.dimensions[2] == 1, 0.0, {}, Eigen::Vector3d::Zero(), 0.0};
+  ValidVoxels region{valid, geometry, geometry.dimensions[2] == 1, marginMm, 0.0, {}, Eigen::Vector3d::Zero(), 0.0};
   const Eigen::Vector3d& spacing = geometry.spacing;
-  region.beyond = marginMm + 0.5 * (region.plane ? std::sqrt(spacing.x() * spacing.y()) : std::cbrt(spacing.prod()));
 
   const auto& n = geometry.dimensions;
   std::vector<std::array<Range, 3>> boxes(static_cast<std::size_t>(n[2]));
@@ -107,6 +111,9 @@ ValidVoxels RegionOf(VolumeView<const unsigned char> valid, const ImageGeometry&
 
   const Eigen::Vector3d low(box[0].low, box[1].low, box[2].low), high(box[0].high, box[1].high, box[2].high);
   const Eigen::Vector3d extent = (high - low).cwiseProduct(spacing), middle = 0.5 * (low + high);
+  if (marginMm < 0.0)
+    region.margin = std::min(mostMargin, extent.maxCoeff() / marginParts);
+  region.beyond = region.margin + 0.5 * (region.plane ? std::sqrt(spacing.x() * spacing.y()) : std::cbrt(spacing.prod()));
   region.middle = geometry.IndexToWorld() * middle;
   region.size = extent.norm() + 2.0 * region.beyond;
 
@@ -160,6 +167,7 @@ struct Head {
 
 // The fan that is not to become less, and the unit of bends.
 struct Least {
+  OutlineFamily family = OutlineFamily::Curved;
   double halfway = 1.0;                  // mm of depth
   double fanBend = 1.0, sweepBend = 1.0; // the greatest that are allowed
   double fanTurn = widestTurn, sweepTurn = widestTurn;
@@ -199,6 +207,14 @@ public:
       extent.sweep.Hold(sweep.along, beyond_ / std::max(sweep_.Span(sweep.depth), 1e-6));
   }
 
+  Extent OfPoints(const ValidVoxels& region) const
+  {
+    Extent extent;
+    for (const Eigen::Vector3d& point : region.points)
+      Hold(point, extent);
+    return extent;
+  }
+
   bool IsPlane() const { return plane_; }
 
 private:
@@ -221,6 +237,22 @@ double HalfWidth(const Range& range, double middle, const ProbeArc& unit, const 
   return half;
 }
 
+// Where nothing bends a head may be moved sideways with its beams: into the middle of what they hold.
+Head Centred(Head head, Extent& extent)
+{
+  Eigen::Vector3d aside = Eigen::Vector3d::Zero();
+  if (head.fanBend == 0.0 && head.fanMiddle == 0.0 && extent.fan.Length() >= 0.0) {
+    aside.x() = extent.fan.Middle();
+    extent.fan = {-0.5 * extent.fan.Length(), 0.5 * extent.fan.Length()};
+  }
+  if (head.sweepBend == 0.0 && extent.sweep.Length() >= 0.0) {
+    aside.y() = extent.sweep.Middle();
+    extent.sweep = {-0.5 * extent.sweep.Length(), 0.5 * extent.sweep.Length()};
+  }
+  head.probeToWorld.translation() += head.probeToWorld.linear() * aside;
+  return head;
+}
+
 // The least fan with this head, and by how much its beams turn too far (radians).
 std::pair<ProbeGeometry, double> FanOf(const Head& head, const Least& least, Extent extent, bool plane)
 {
@@ -238,6 +270,9 @@ std::pair<ProbeGeometry, double> FanOf(const Head& head, const Least& least, Ext
   ProbeGeometry found;
   found.depthMin = extent.depth.low;
   found.depthMax = extent.depth.high;
+  if (least.family == OutlineFamily::Phased) // to the tip, which must not lie within what is held
+    found.depthMin = std::min(found.depthMin, 0.0);
+  const double behind = std::max(0.0, -found.depthMin / least.halfway);
   if (fan.angle > 0.0) // no further than the centre of the fan's arc
     found.depthMin = std::max(found.depthMin, -fan.width / fan.angle);
   const double half = (1.0 + slack) * HalfWidth(extent.fan, head.fanMiddle, fan, least.shape ? &fanOfShape : nullptr, far);
@@ -245,6 +280,8 @@ std::pair<ProbeGeometry, double> FanOf(const Head& head, const Least& least, Ext
   found.fanWidth = 2.0 * half * fan.width;
   found.fanOffset = head.fanMiddle / (2.0 * half);
   double excess = std::max(0.0, fan.angle * (half + std::abs(head.fanMiddle)) - least.fanTurn);
+  if (least.family == OutlineFamily::Phased)
+    excess += behind;
   if (!plane) {
     const double across = (1.0 + slack) * HalfWidth(extent.sweep, 0.0, sweep, least.shape ? &sweepOfShape : nullptr, far);
     found.sweepAngle = 2.0 * across * sweep.angle;
@@ -259,10 +296,9 @@ std::pair<ProbeGeometry, double> FanOf(const Head& head, const Least& least, Ext
 double CostOf(const Head& head, const Least& least, const ValidVoxels& region)
 {
   const Measure measure(head, least, region);
-  Extent extent;
-  for (const Eigen::Vector3d& point : region.points)
-    measure.Hold(point, extent);
-  const auto [fan, excess] = FanOf(head, least, extent, measure.IsPlane());
+  Extent extent = measure.OfPoints(region);
+  const Head centred = Centred(head, extent);
+  const auto [fan, excess] = FanOf(centred, least, extent, measure.IsPlane());
   return std::log(std::max(FanVolume(fan), 1e-300)) + 1e3 * excess;
 }
 
@@ -272,11 +308,13 @@ public:
   Knobs(const Head& start, const Least& least, const ValidVoxels& region, bool plane)
     : start_(start), least_(least), region_(region)
   {
-    for (int knob = 0; knob < Count; ++knob)
-      if (!plane || knob == AlongX || knob == AlongZ || knob == AboutY || knob == FanBend)
+    const bool curved = least.family == OutlineFamily::Curved, linear = least.family == OutlineFamily::Linear;
+    for (int knob = 0; knob < Count; ++knob) {
+      const bool along = knob == AlongX || knob == AlongY || knob == AlongZ, bend = knob == FanBend || knob == SweepBend;
+      if ((!plane || knob == AlongX || knob == AlongZ || knob == AboutY || knob == FanBend) && (curved || !bend) &&
+          !(linear && along) && (least.offset || knob != FanMiddle))
         used_.push_back(knob);
-    if (!least.offset)
-      used_.erase(std::remove(used_.begin(), used_.end(), static_cast<int>(FanMiddle)), used_.end());
+    }
   }
 
   std::size_t Size() const { return used_.size(); }
@@ -314,6 +352,12 @@ private:
 struct Priced {
   Head head;
   double cost = 0.0;
+};
+
+// Where a search begins, and within what limits.
+struct Start {
+  Least least;
+  Priced rated;
 };
 
 // One run of the simplex method from a corner at the start; \a steps evaluations at most.
@@ -388,6 +432,24 @@ Head PlainHead(const Pose& pose, double fanBend, double sweepBend, const ValidVo
   Head head{pose, fanBend, sweepBend, 0.0};
   head.probeToWorld.translation() = pose.linear() * Eigen::Vector3d(x.Middle(), y.Middle(), z.low);
   return head;
+}
+
+// A box that looks along the axes of \a pose.
+Start BoxStart(const Pose& pose, const ValidVoxels& region)
+{
+  return {{OutlineFamily::Linear, 1.0, 0.0, 0.0}, {PlainHead(pose, 0.0, 0.0, region), 0.0}};
+}
+
+// Beams along the axes of \a pose from a point \a back mm before the near end of the region.
+Start PhasedStart(const Pose& pose, double back, const ValidVoxels& region)
+{
+  Start start;
+  start.least.family = OutlineFamily::Phased;
+  Head& head = start.rated.head = PlainHead(pose, 1.0, 1.0, region);
+  const Eigen::Vector3d depth = head.probeToWorld.linear().col(2);
+  start.least.halfway = std::max(back + depth.dot(region.middle - head.probeToWorld.translation()), 1e-3 * region.size);
+  head.probeToWorld.translation() -= back * depth;
+  return start;
 }
 
 double BendOf(const ProbeArc& arc, double halfway)
@@ -473,12 +535,95 @@ PlacedProbe FoundFrom(const ValidVoxels& region, const Progress& progress)
   return box;
 }
 
+// The axes of the grid, in the order and the directions in which they come next to those of \a pose.
+Pose AlongGrid(const Pose& pose, const ImageGeometry& geometry)
+{
+  const Eigen::Matrix3d& axes = geometry.direction;
+  Eigen::Index depth = 0, across = 0;
+  (axes.transpose() * pose.linear().col(2)).cwiseAbs().maxCoeff(&depth);
+  Eigen::Vector3d shares = (axes.transpose() * pose.linear().col(0)).cwiseAbs();
+  shares[depth] = -1.0;
+  shares.maxCoeff(&across);
+  const auto towards = [&axes](Eigen::Index axis, const Eigen::Vector3d& wanted) {
+    return Eigen::Vector3d(axes.col(axis) * (axes.col(axis).dot(wanted) < 0.0 ? -1.0 : 1.0));
+  };
+  const Eigen::Vector3d z = towards(depth, pose.linear().col(2)), x = towards(across, pose.linear().col(0));
+  Pose along = pose;
+  along.linear() << x, z.cross(x), z;
+  return along;
+}
+
+// The base, and the two best of plain fans along its axes.
+std::vector<Start> CurvedStarts(const PlacedProbe& base, const EnclosingFanParameters& parameters, const ValidVoxels& region)
+{
+  Least least;
+  least.halfway =
+      std::max(0.5 * (base.geometry.depthMin + base.geometry.depthMax), 0.25 * (base.geometry.depthMax - base.geometry.depthMin));
+  const ProbeArc fan = base.geometry.Fan(), sweep = base.geometry.Sweep();
+  Head start{base.probeToWorld, BendOf(fan, least.halfway), BendOf(sweep, least.halfway), 0.0};
+  start.fanMiddle = base.geometry.fanOffset * fan.Span(least.halfway);
+  least.offset = start.fanMiddle != 0.0;
+  least.fanTurn = std::max(least.fanTurn, fan.angle * (0.5 + std::abs(base.geometry.fanOffset)));
+  least.sweepTurn = std::max(least.sweepTurn, 0.5 * sweep.angle);
+  if (parameters.shape) {
+    least.shape = &parameters.shape->geometry;
+    least.fanBend = start.fanBend;
+    if (!base.geometry.IsPlane())
+      least.sweepBend = start.sweepBend;
+  }
+  std::vector<Start> starts;
+  for (const double part : {0.0, 0.3, 0.6, 1.0}) {
+    const Head plain =
+        PlainHead(base.probeToWorld, part * std::min(least.fanBend, 0.6), part * std::min(least.sweepBend, 0.6), region);
+    starts.push_back({least, {plain, CostOf(plain, least, region)}});
+  }
+  std::stable_sort(starts.begin(), starts.end(), [](const Start& a, const Start& b) { return a.rated.cost < b.rated.cost; });
+  starts.resize(2);
+  starts.push_back({least, {start, 0.0}});
+  return starts;
+}
+
+// Whether the data begin where phased beams do: no wider there than what the margin and a voxel make of a point, and a twentieth
+// of what they are at the other end.
+bool BeginsAtAPoint(const Start& start, const ValidVoxels& region)
+{
+  const Measure measure(start.rated.head, start.least, region);
+  const Extent extent = measure.OfPoints(region);
+  const ProbeGeometry fan = FanOf(start.rated.head, start.least, extent, measure.IsPlane()).first;
+  const double angle = std::max(fan.fanAngle, fan.sweepAngle), near = extent.depth.low + region.beyond;
+  return angle * near <= 3.0 * region.beyond / std::max(std::cos(0.5 * angle), 0.1) + 0.05 * angle * fan.depthMax;
+}
+
+// The best start of the simplest family that is about as small as any.
+const Start& SimplestOf(std::vector<Start>& starts)
+{
+  std::stable_sort(starts.begin(), starts.end(), [](const Start& a, const Start& b) { return a.rated.cost < b.rated.cost; });
+  const double limit = starts.front().rated.cost + std::log1p(asSmall);
+  return *std::min_element(starts.begin(), starts.end(), [limit](const Start& a, const Start& b) {
+    const bool aCounts = a.rated.cost <= limit, bCounts = b.rated.cost <= limit;
+    return aCounts != bCounts ? aCounts : aCounts && a.least.family < b.least.family;
+  });
+}
+
 } // namespace
 
 ParameterList Describe(EnclosingFanParameters& p)
 {
-  return {Parameter("MarginMm", p.marginMm, {0, Unlimited}, "mm",
-                    "How far the fan reaches beyond the centres of the voxels at least, in depth and to all sides.")};
+  return {
+      Parameter("MarginMm", p.marginMm, {-1, Unlimited}, "mm",
+                "How far the fan reaches beyond the centres of the voxels at least, in depth and to all sides. Below 0: by a "
+                "fortieth of the longest side of the data, at most 5 mm."),
+      Parameter("Outline", Choice(p.outline, {"automatic", "linear", "phased", "curved"}),
+                "The kind of probe whose beams give the outline, where no fan is given: linear makes a box, phased a fan from "
+                "a single point, curved one that bends as it must. Automatic: the simplest that is at most 5% larger than "
+                "the smallest, phased only where the data begin at a point.")};
+}
+
+OutlineFamily FamilyOf(const ProbeGeometry& geometry)
+{
+  if (geometry.fanAngle == 0.0 && geometry.sweepAngle == 0.0)
+    return OutlineFamily::Linear;
+  return geometry.fanWidth == 0.0 && geometry.sweepWidth == 0.0 ? OutlineFamily::Phased : OutlineFamily::Curved;
 }
 
 double FanVolume(const ProbeGeometry& geometry)
@@ -523,48 +668,49 @@ PlacedProbe EncloseRegion(VolumeView<const unsigned char> valid, const ImageGeom
     throw Error(Error::Kind::BadInput, "enclosing fan: the valid region has other dimensions than the volume");
 
   const ValidVoxels region = RegionOf(valid, geometry, parameters.marginMm, progress.Part(0.0, 0.2));
-  if (parameters.shape && Holds(*parameters.shape, region, parameters.marginMm, progress.Part(0.2, 0.3)))
+  if (parameters.shape && Holds(*parameters.shape, region, region.margin, progress.Part(0.2, 0.3)))
     return *parameters.shape;
 
   const PlacedProbe base = parameters.shape ? *parameters.shape : FoundFrom(region, progress.Part(0.2, 0.5));
   const bool plane = region.plane && base.geometry.IsPlane();
-  Least least;
-  least.halfway =
-      std::max(0.5 * (base.geometry.depthMin + base.geometry.depthMax), 0.25 * (base.geometry.depthMax - base.geometry.depthMin));
-  const ProbeArc fan = base.geometry.Fan(), sweep = base.geometry.Sweep();
-  Head start{base.probeToWorld, BendOf(fan, least.halfway), BendOf(sweep, least.halfway), 0.0};
-  start.fanMiddle = base.geometry.fanOffset * fan.Span(least.halfway);
-  least.offset = start.fanMiddle != 0.0;
-  least.fanTurn = std::max(least.fanTurn, fan.angle * (0.5 + std::abs(base.geometry.fanOffset)));
-  least.sweepTurn = std::max(least.sweepTurn, 0.5 * sweep.angle);
-  if (parameters.shape) {
-    least.shape = &parameters.shape->geometry;
-    least.fanBend = start.fanBend;
-    if (!base.geometry.IsPlane())
-      least.sweepBend = start.sweepBend;
+  const auto isWanted = [&parameters](OutlineFamily family) {
+    return parameters.shape ? family == OutlineFamily::Curved
+                            : parameters.outline == OutlineFamily::Automatic || parameters.outline == family;
+  };
+  std::vector<Start> starts;
+  if (isWanted(OutlineFamily::Linear)) {
+    starts.push_back(BoxStart(base.probeToWorld, region));
+    starts.push_back(BoxStart(AlongGrid(base.probeToWorld, geometry), region));
   }
-
-  std::vector<Priced> starts;
-  for (const double part : {0.0, 0.3, 0.6, 1.0})
-    starts.push_back(
-        {PlainHead(base.probeToWorld, part * std::min(least.fanBend, 0.6), part * std::min(least.sweepBend, 0.6), region), 0.0});
-  starts.push_back({start, 0.0});
-  for (Priced& rated : starts)
-    rated.cost = CostOf(rated.head, least, region);
-  const auto cheaper = [](const Priced& a, const Priced& b) { return a.cost < b.cost; };
-  std::stable_sort(starts.begin(), starts.end() - 1, cheaper);
-  std::swap(starts[2], starts.back()); // two plain ones, and the base
-  starts.resize(3);
+  if (isWanted(OutlineFamily::Phased)) {
+    const ProbeArc fan = base.geometry.Fan();
+    const double most = 4.0 * region.size;
+    starts.push_back(PhasedStart(base.probeToWorld, fan.angle > 0.0 ? std::min(fan.width / fan.angle, most) : most, region));
+    starts.push_back(PhasedStart(base.probeToWorld, 0.1 * region.size, region));
+  }
+  if (isWanted(OutlineFamily::Curved))
+    for (const Start& start : CurvedStarts(base, parameters, region))
+      starts.push_back(start);
+  for (Start& start : starts)
+    start.rated.cost = CostOf(start.rated.head, start.least, region);
   ParallelFor(static_cast<std::ptrdiff_t>(starts.size()), progress.Part(0.5, 0.9), [&](std::ptrdiff_t i) {
-    Priced& rated = starts[static_cast<std::size_t>(i)];
+    auto& [least, rated] = starts[static_cast<std::size_t>(i)];
     rated = Simplex(rated, least, region, plane, 1.0, 600);
     rated = Simplex(rated, least, region, plane, 0.4, 600); // a simplex may have become flat
   });
-  const Head& best = std::min_element(starts.begin(), starts.end(), cheaper)->head;
+  if (parameters.outline == OutlineFamily::Automatic)
+    starts.erase(std::remove_if(starts.begin(), starts.end(),
+                                [&region](const Start& start) {
+                                  return start.least.family == OutlineFamily::Phased && !BeginsAtAPoint(start, region);
+                                }),
+                 starts.end());
+  const Start& best = SimplestOf(starts);
 
-  const Measure measure(best, least, region);
-  PlacedProbe found{FanOf(best, least, ExtentOf(measure, region, progress.Part(0.9, 1.0)), plane).first, best.probeToWorld};
-  if (!parameters.shape)
+  const Measure measure(best.rated.head, best.least, region);
+  Extent extent = ExtentOf(measure, region, progress.Part(0.9, 1.0));
+  const Head head = Centred(best.rated.head, extent);
+  PlacedProbe found{FanOf(head, best.least, extent, plane).first, head.probeToWorld};
+  if (!parameters.shape && best.least.family != OutlineFamily::Phased)
     BeginAtNearEdge(found);
   return found;
 }

@@ -8,8 +8,17 @@
 
 namespace echorama {
 
+/// The kinds of outlines that are looked for, the simpler first.
+enum class OutlineFamily {
+  Automatic, ///< the one that leaves least empty, or nearly so
+  Linear,    ///< parallel beams from a flat face: a box
+  Phased,    ///< all beams from one point, which is depth 0: the tip is part of it
+  Curved,    ///< an array and a sweep that bend as much as it takes
+};
+
 struct EnclosingFanParameters {
-  double marginMm = 0.0;
+  double marginMm = 0.0; ///< negative: a fortieth of the longest side of the region, at most 5 mm
+  OutlineFamily outline = OutlineFamily::Automatic;
   /// The fan to enlarge, that of the machine which acquired the volumes; none: one is found from the region.
   std::optional<PlacedProbe> shape;
 };
@@ -22,11 +31,15 @@ ParameterList Describe(EnclosingFanParameters& p);
 /// along the grid's axes where it finds nothing (a single voxel, islands). Every real voxel is inside by BeamPointAt, with
 /// half a voxel around it. No beam is turned by more than 85 degrees, unless the start had such beams.
 ///
+/// No outline cuts data, so the families (OutlineFamily) are weighed by what they would leave to invent: the simplest counts that
+/// is at most 5% larger than the least; phased beams are simpler than curved ones only where the data begin at a point. A fan
+/// whose beams are nearly parallel so becomes a box, and a box does not depend on what a ragged border makes of the angle.
+///
 /// With a shape: where that holds every voxel (to a hundredth of one), with the margin, it is returned as it is. Else the search
 /// starts from it, and what comes out is nowhere less than it: the depths reach from its first to its last or further, fan and
 /// sweep are as wide or wider at its face and at its last depth, and its array and its sweep do not bend more (the radii are as
 /// large or larger). The pose is free. Its face stays depth 0; without a shape that is the near edge of the region, as in a
-/// ProbeFit.
+/// ProbeFit, or the common start of phased beams. The family is not asked for then: it is that of the shape.
 ///
 /// A mask of one slice (dimensions[2] == 1) gets a single plane, unless the shape sweeps. An empty mask means that every voxel is
 /// valid. The result does not depend on the number of threads. Cost: three passes over the voxels, and searches whose time does
@@ -35,6 +48,9 @@ ParameterList Describe(EnclosingFanParameters& p);
 /// Error(InvalidParameter) for a margin that is negative or not finite or a shape that does not pass Check(), Error(Cancelled).
 PlacedProbe EncloseRegion(VolumeView<const unsigned char> valid, const ImageGeometry& geometry,
                           const EnclosingFanParameters& parameters = {}, const Progress& progress = {});
+
+/// The family of a probe's outline.
+OutlineFamily FamilyOf(const ProbeGeometry& geometry);
 
 /// How much space the beams of a probe fill: mm^3; of a single plane mm^2.
 double FanVolume(const ProbeGeometry& geometry);

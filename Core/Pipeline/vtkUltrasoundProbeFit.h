@@ -59,10 +59,25 @@ public:
   vtkUltrasoundSwitchMacro(EncloseRegion);
 
   /**
-   * How far the fan reaches beyond the centres of the voxels at least, in depth and to all sides. Used when EncloseRegion is on.
-   * At least 0 mm; default 0.
+   * How far the fan reaches beyond the centres of the voxels at least, in depth and to all sides. Below 0: by a fortieth of the
+   * longest side of the data, at most 5 mm. Used when EncloseRegion is on. At least -1 mm; default 0.
    */
   vtkUltrasoundNumberMacro(MarginMm);
+
+  enum Outlines { AUTOMATIC = 0, LINEAR = 1, PHASED = 2, CURVED = 3 };
+
+  ///@{
+  /**
+   * The kind of probe whose beams give the outline, where no fan is given: linear makes a box, phased a fan from a single point,
+   * curved one that bends as it must. Automatic: the simplest that is at most 5% larger than the smallest, phased only where the
+   * data begin at a point. Used when EncloseRegion is on. Default automatic. There are AUTOMATIC, LINEAR, PHASED, CURVED.
+   */
+  vtkUltrasoundChoiceMacro(Outline);
+  void SetOutlineToAutomatic() { this->SetOutline(AUTOMATIC); }
+  void SetOutlineToLinear() { this->SetOutline(LINEAR); }
+  void SetOutlineToPhased() { this->SetOutline(PHASED); }
+  void SetOutlineToCurved() { this->SetOutline(CURVED); }
+  ///@}
 
   /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of

@@ -356,6 +356,102 @@ TEST(EnclosingFan, DoesNotDependOnThreads)
   EXPECT_EQ(fans[0].probeToWorld.matrix(), fans[1].probeToWorld.matrix());
 }
 
+// A box of parallel beams, however its angle is hidden: nearly parallel beams, a ragged border, the end of the grid.
+TEST(EnclosingFan, OfALinearProbeIsABox)
+{
+  const ProbeGeometry array = ProbeGeometry::Linear(38, 24, 0, 40);
+  const auto expect = [](const Region& region, double most, const char* what) {
+    SCOPED_TRACE(what);
+    const PlacedProbe fan = Enclosed(region);
+    EXPECT_EQ(FamilyOf(fan.geometry), OutlineFamily::Linear);
+    ExpectEncloses(fan, region, most);
+  };
+  const Eigen::Matrix3d oblique = ExpRotation(Eigen::Vector3d(-0.2, 0.1, 0.3));
+  expect(UnionOf({Placed(array, 5, 6, 7, 0, 0, 20)}, {1, 1, 1}, oblique), 1.13, "one view");
+  // Three views side by side, the outer ones turned a little, as a hand does.
+  const std::vector<PlacedProbe> views{Placed(array, -6, 0, 0, 0, 2, 0), Placed(array, 0, 4, 0),
+                                       Placed(array, 6, -3, 0, 1, -2, 0)};
+  expect(UnionOf(views, {1, 1, 1}), 1.35, "three views");
+  const double slight = 1.5 * degree;
+  expect(UnionOf({Placed({slight, 38.0, slight, 24.0, 0.0, 40.0}, 0, 0, 0)}, {1, 1, 1}), 1.15, "beams that hardly spread");
+  Region ragged = UnionOf({Placed(array, 0, 0, 0)}, {1, 1, 1});
+  const Volume<unsigned char> whole = ragged.mask;
+  Random random(3);
+  for (int k = 1; k + 1 < ragged.grid.dimensions[2]; ++k)
+    for (int j = 1; j + 1 < ragged.grid.dimensions[1]; ++j)
+      for (int i = 1; i + 1 < ragged.grid.dimensions[0]; ++i)
+        if (!(whole.View()(i - 1, j, k) && whole.View()(i + 1, j, k) && whole.View()(i, j - 1, k) && whole.View()(i, j + 1, k) &&
+              whole.View()(i, j, k - 1) && whole.View()(i, j, k + 1)))
+          ragged.mask.View()(i, j, k) &= random.Uniform() < 0.6;
+  expect(ragged, 1.25, "a ragged border");
+  const Region views3 = UnionOf(views, {1, 1, 1});
+  ImageGeometry cut = views3.grid; // the grid ends within the data
+  cut.dimensions[0] -= 12;
+  cut.dimensions[2] -= 9;
+  Region end{cut, Volume<unsigned char>(cut.dimensions)};
+  for (int k = 0; k < cut.dimensions[2]; ++k)
+    for (int j = 0; j < cut.dimensions[1]; ++j)
+      std::copy_n(views3.mask.View().Row(j, k), cut.dimensions[0], end.mask.View().Row(j, k));
+  expect(end, 1.3, "cut by the grid");
+}
+
+TEST(EnclosingFan, OfAPhasedProbeBeginsAtAPoint)
+{
+  const ProbeGeometry sector = ProbeGeometry::Phased(80 * degree, 60 * degree, 0.0, 90.0);
+  const PlacedProbe truth = Placed(sector, 10, -20, 5, 15, -20, 40);
+  const Region region = UnionOf({truth}, Eigen::Vector3d::Constant(1.5));
+  EnclosingFanParameters parameters;
+  for (const OutlineFamily family : {OutlineFamily::Automatic, OutlineFamily::Phased}) {
+    parameters.outline = family;
+    const PlacedProbe fan = Enclosed(region, parameters);
+    EXPECT_EQ(FamilyOf(fan.geometry), OutlineFamily::Phased);
+    ExpectEncloses(fan, region, 1.16);
+    EXPECT_EQ(fan.geometry.depthMin, 0.0);
+    EXPECT_LT((fan.probeToWorld.translation() - truth.probeToWorld.translation()).norm(), 5.0);
+  }
+  parameters.marginMm = 4.0;
+  // To have it at its sides the tip moves back by (4 + 0.75) / sin(30 degrees): (90 + 9.5 + 4.75)^3 / 90^3 is 1.55.
+  ExpectEncloses(Enclosed(region, parameters), region, 1.6, 4.0 - 1e-6);
+  // A curved array stays one: a point would have to lie far behind it.
+  const Region other = UnionOf({Placed(convex, 0, 0, 0)}, Eigen::Vector3d::Constant(2.0));
+  EXPECT_EQ(FamilyOf(Enclosed(other).geometry), OutlineFamily::Curved);
+}
+
+// Whatever is asked for is made, encloses all, and is no smaller than what is found without asking.
+TEST(EnclosingFan, FamiliesCanBeForced)
+{
+  const Region regions[] = {
+      UnionOf({Placed(convex, 0, 0, 0, 10, 20, 0)}, Eigen::Vector3d::Constant(3.0)),
+      UnionOf({Placed(ProbeGeometry::Linear(38, 24, 0, 40), 0, 0, 0)}, Eigen::Vector3d::Constant(1.5)),
+      RegionOf(GridOf(60, 50, 1), [](const Eigen::Vector3d& at) { return at.x() + at.y() > 30.0; }),
+      RegionOf(GridOf(30, 30, 30), [](const Eigen::Vector3d& at) { return at.norm() < 3.0 || (at.array() > 26.0).all(); })};
+  for (const Region& region : regions) {
+    const double found = FanVolume(Enclosed(region).geometry);
+    for (const OutlineFamily family : {OutlineFamily::Linear, OutlineFamily::Phased, OutlineFamily::Curved}) {
+      EnclosingFanParameters parameters;
+      parameters.outline = family;
+      const PlacedProbe fan = Enclosed(region, parameters);
+      EXPECT_EQ(Outside(fan, region), 0);
+      if (family != OutlineFamily::Curved) {
+        EXPECT_EQ(FamilyOf(fan.geometry), family);
+      }
+      EXPECT_GT(FanVolume(fan.geometry), found / 1.05);
+    }
+  }
+}
+
+TEST(EnclosingFan, AMarginBelow0GrowsWithTheRegion)
+{
+  EnclosingFanParameters parameters;
+  parameters.marginMm = -1.0;
+  for (const auto& [side, margin] : {std::pair{40, 1.0}, {120, 3.0}, {400, 5.0}}) {
+    const ImageGeometry grid = GridOf(5, 5, 5, Eigen::Vector3d::Constant(side / 4.0));
+    Region region = RegionOf(grid, [](const Eigen::Vector3d&) { return true; });
+    const PlacedProbe fan = Enclosed(region, parameters);
+    EXPECT_NEAR(fan.geometry.depthMax, side * 1.25 + 2.0 * margin, 0.01 * side) << side;
+  }
+}
+
 TEST(EnclosingFan, RefusesBadInput)
 {
   const Region full = RegionOf(GridOf(12, 10, 8), [](const Eigen::Vector3d&) { return true; });
@@ -364,7 +460,7 @@ TEST(EnclosingFan, RefusesBadInput)
   EXPECT_EQ(RefusalOf({GridOf(10, 12, 8), full.mask}), Error::Kind::BadInput);
   EXPECT_EQ(RefusalOf({GridOf(12, 10, 8, {1, 0, 1}), full.mask}), Error::Kind::BadInput);
   EnclosingFanParameters wrong;
-  wrong.marginMm = -1.0;
+  wrong.marginMm = -1.5;
   EXPECT_EQ(RefusalOf(full, wrong), Error::Kind::InvalidParameter);
   wrong.marginMm = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(RefusalOf(full, wrong), Error::Kind::InvalidParameter);

@@ -55,6 +55,32 @@ def phantom(spacing):
     return stitcher.GetOutput()
 
 
+def tank(spacing):
+    """Three views of a linear probe in water, each with speckle of its own: two walls and a block of tissue."""
+    stitcher = vtkUltrasoundStitcher()
+    for seed, (place, turn) in enumerate((((-6, 0, 0), (0, 2, 0)), ((0, 4, 0), (0, 0, 0)), ((6, -3, 0), (1, -2, 0))), 1):
+        source = vtkUltrasoundNoiseSource()
+        for name, value in (("FanAngle", 0), ("FanWidth", 38), ("SweepAngle", 0), ("SweepWidth", 24), ("DepthMax", 40),
+                            ("IntensityModel", 0), ("Mean", 50), ("DepthCorrelationMm", 0.35), ("FanCorrelation", 0.5 / 38),
+                            ("SweepCorrelation", 0.6 / 24), ("SpacingMm", spacing), ("Seed", seed)):
+            getattr(source, "Set" + name)(value)
+        source.SetPosition(*place)
+        source.SetOrientation(*turn)
+        source.FloatOutputOn()
+        source.Update()
+        view = source.GetOutput()
+        axes, origin = view.GetDirectionMatrix(), view.GetOrigin()
+        index = np.meshgrid(*(np.arange(n) for n in view.GetDimensions()[::-1]), indexing="ij", sparse=True)[::-1]
+        x, y, z = (origin[i] + sum(axes.GetElement(i, j) * view.GetSpacing()[j] * index[j] for j in range(3)) for i in range(3))
+        wall = (abs(z - 35) < 0.4) | ((abs(z - 10.5 - 0.1 * y) < 0.4) & (x < -10))
+        block = (x > 6) & (y > -4) & (abs(z - 22) < 7)
+        echo = array(view, "Intensity") * np.where(wall, 3, np.where(block, 1, 0.03))
+        stitcher.AddInputData(with_arrays(view, Intensity=np.minimum(echo + 0.5, 255).astype(np.uint8),
+                                          ValidRegion=array(view, "ValidRegion")))
+    stitcher.Update()
+    return stitcher.GetOutput()
+
+
 def given(paths):
     stitcher = vtkUltrasoundStitcher()
     for path in paths:
@@ -204,6 +230,27 @@ def ways(folder, scenes):
     save(folder, "embedding_ways.png", rows, WAYS, [scene.name for scene in scenes])
 
 
+def outlines(folder, spacing):
+    """A linear probe in water: in a fan with fixed widths, and as the data ask."""
+    scene = Scene("a tank", tank(spacing))
+    embedder = vtkUltrasoundEmbedder()
+    embedder.SetInputData(scene.stitched)
+    for name, value in (("Outline", 3), ("MarginMm", 5), ("FeatherMm", 3), ("MatchGrain", False)):
+        getattr(embedder, "Set" + name)(value)
+    embedder.Update()
+    rows, spans = [], []
+    for volume in (embedder.GetOutput(), scene.full):
+        labels = array(volume, "Embedding")
+        plane = labels.shape[1] // 2
+        grey = np.sqrt(np.clip(array(volume, "Intensity")[:, plane] / 130, 0, 1)) * 255
+        spans.append([grey, COLOURS[labels[:, plane]]])
+        seen = ((labels == 1) | (labels == 2)).sum()
+        print(f"{scene.name}: {(labels == 2).sum() / seen:.1%} of the data mixed, {(labels == 3).sum() / (labels > 0).sum():.1%} invented")
+    rows.append([spans[0][0], spans[0][1], *(np.pad(panel, [(1, 1), (1, 1), (0, 0)][:panel.ndim]) for panel in spans[1])])
+    save(folder, "embedding_outlines.png", rows, ("a curved fan, fixed widths", "grey: data, blue: blend, orange: invented",
+                                                  "as the data ask", ""), [scene.name])
+
+
 WAYS = ("laid over noise", "with a soft edge", "noise with the levels of the data", "and their contrast and grain")
 
 
@@ -245,6 +292,7 @@ def main():
     coverage(options.folder, scenes)
     backgrounds(options.folder, scenes)
     ways(options.folder, scenes)
+    outlines(options.folder, 0.2 * options.spacing)
 
 
 main()

@@ -2,7 +2,8 @@
 //
 // Local mean and deviation vary slowly, so they spread on blocks of voxels: the surface is that of the blocks which hold data,
 // its values are those measured in the data alone at the middle of each block, and both channels share their weights. Only blocks
-// near voxels that show background are worked out. Between blocks values are interpolated.
+// near voxels that show background are worked out. Between blocks values are interpolated. Where a window at the surface has more
+// contrast than speckle has, single bright echoes are taken out of it before its values spread (SpeckleLevel).
 //
 // Cost: two passes over the volume for the distance map and the statistics of the data, three over the noise to flatten it, one
 // where it shows to flatten it again and one to give it its new mean and contrast, two for the overlay; the diffusion depends on
@@ -14,6 +15,7 @@
 #include "Core/Imaging/VoxelTypes.h"
 #include "LocalStatistics.h"
 #include "RegionSurface.h"
+#include "SpeckleLevel.h"
 #include "ToneMapping.h"
 #include <algorithm>
 #include <cmath>
@@ -28,6 +30,10 @@ namespace {
 
 // The deviation over the mean of fully developed speckle (Rayleigh): noise of more contrast would be cut off at black.
 constexpr double mostContrast = 0.5227;
+
+// Of a window at the surface: what deviates by so many times that may hold a wall, and holds one when the mean without single
+// bright echoes is so much less.
+constexpr double mayBeAWall = 1.15, isAWall = 0.8;
 
 // Blocks of about a standard deviation, or as large as the limit on their number makes them.
 Blocks BlocksFor(const EmbedParameters& parameters, const std::array<int, 3>& dimensions, const Eigen::Vector3d& spacing)
@@ -90,11 +96,12 @@ struct SpreadStatistics {
   Volume<double> mean, deviation;
 };
 
-SpreadStatistics Spread(const EmbedParameters& parameters, const LocalStatistics& statistics,
+template <class T>
+SpreadStatistics Spread(const EmbedParameters& parameters, const LocalStatistics& statistics, VolumeView<const T> intensity,
                         VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing,
-                        VolumeView<const unsigned char> shown, VolumeView<const unsigned char> bare, double roundedVariance,
-                        const Progress& progress)
+                        VolumeView<const unsigned char> shown, VolumeView<const unsigned char> bare, const Progress& progress)
 {
+  const double roundedVariance = std::is_integral_v<T> ? 1.0 / 12.0 : 0.0; // that rounding adds to data and result alike
   SpreadStatistics spread;
   const Blocks& blocks = spread.blocks = BlocksFor(parameters, region.Dimensions(), spacing);
   std::vector<Volume<unsigned char>> some = BlocksWith(blocks, {region, shown, bare}, progress.Part(0.0, 0.2));
@@ -115,12 +122,25 @@ SpreadStatistics Spread(const EmbedParameters& parameters, const LocalStatistics
   sources.channels = 2;
   const std::size_t count = sources.voxels.size();
   sources.values.resize(2 * count);
-  for (std::size_t s = 0; s < count; ++s) {
-    std::array<int, 3> middle{};
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      middle[axis] = std::min(sources.voxels[s][axis] * blocks.size[axis] + blocks.size[axis] / 2, blocks.voxels[axis] - 1);
-    statistics.Row(middle[1], middle[2], middle[0], middle[0] + 1, &sources.values[s], &sources.values[count + s]);
-  }
+  std::array<int, 3> reach{};
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    reach[axis] = static_cast<int>(1.5 * parameters.smoothMm / spacing[static_cast<Eigen::Index>(axis)]);
+  ParallelRanges(static_cast<std::ptrdiff_t>(count), 64, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    for (auto s = static_cast<std::size_t>(begin); s < static_cast<std::size_t>(end); ++s) {
+      std::array<int, 3> middle{};
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        middle[axis] = std::min(sources.voxels[s][axis] * blocks.size[axis] + blocks.size[axis] / 2, blocks.voxels[axis] - 1);
+      float &level = sources.values[s], &contrast = sources.values[count + s];
+      statistics.Row(middle[1], middle[2], middle[0], middle[0] + 1, &level, &contrast);
+      if (level > 0.0f && contrast > static_cast<float>(mayBeAWall * mostContrast) * level) {
+        const SpeckleLevel speckle = SpeckleLevelAt(intensity, region, middle, reach);
+        if (speckle.mean < isAWall * static_cast<double>(level)) {
+          level = static_cast<float>(speckle.mean);
+          contrast = std::min(contrast, static_cast<float>(speckle.deviation));
+        }
+      }
+    }
+  });
   const double whole = std::accumulate(sources.values.begin() + static_cast<std::ptrdiff_t>(count), sources.values.end(), 0.0);
   const float least = std::max(1e-30f, static_cast<float>(1e-3 * whole / static_cast<double>(count)));
   for (std::size_t s = count; s < 2 * count; ++s)
@@ -207,9 +227,8 @@ void Embed(const EmbedParameters& parameters, VolumeView<const unsigned char> re
   // 1. what the data are like at their surface, everywhere
   const LocalStatistics statistics =
       GrainStatistics(VolumeView<const T>(intensity), region, spacing, parameters.smoothMm, progress.Part(0.15, 0.25));
-  const double rounded = std::is_integral_v<T> ? 1.0 / 12.0 : 0.0; // the variance that rounding adds to data and result alike
-  const SpreadStatistics spread = Spread(parameters, statistics, region, spacing, std::as_const(shown).View(),
-                                         std::as_const(bare).View(), rounded, progress.Part(0.25, 0.5));
+  const SpreadStatistics spread = Spread<T>(parameters, statistics, intensity, region, spacing, std::as_const(shown).View(),
+                                            std::as_const(bare).View(), progress.Part(0.25, 0.5));
 
   // 2. noise of that kind
   const ToneMappingParameters tone{parameters.smoothMm, parameters.matchContrast};

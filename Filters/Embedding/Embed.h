@@ -22,7 +22,8 @@ double EmbedMemory(const EmbedParameters& parameters, const ImageGeometry& grid)
 
 /// Puts data into a background of noise that looks as if it had been seen with them (dissertation 6.3 to 6.5).
 ///
-/// The local mean and deviation of the data at their surface spread outwards and inwards (Diffuse); the noise loses its own and
+/// The local mean and deviation of the data at their surface, without single bright echoes (SpeckleLevel), spread outwards and
+/// inwards (Diffuse); the noise loses its own and
 /// gets these (ExtractGrain); the data are laid over it with a soft border (Feather). Data deeper than featherMm are not touched.
 /// \param region where the data are (not 0), finite numbers all
 /// \param noise in: any noise, where \a form is; out: the background where it shows, and not a number below the data. Voxels

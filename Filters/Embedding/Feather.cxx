@@ -44,6 +44,12 @@ ParameterList Describe(FeatherParameters& p)
   };
 }
 
+double FeatherDepth(double grainMm, const Eigen::Vector3d& spacing)
+{
+  const double voxel = spacing.minCoeff();
+  return std::min(std::max(grainMm > 0.0 ? 2.0 * grainMm : 4.0 * voxel, 3.0 * voxel), FeatherParameters().featherMm);
+}
+
 void FeatherWeights(const FeatherParameters& parameters, VolumeView<const unsigned char> region,
                     VolumeView<const unsigned char> backgroundRegion, const Eigen::Vector3d& spacing, VolumeView<float> weights,
                     const Progress& progress)

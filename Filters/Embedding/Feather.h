@@ -24,6 +24,10 @@ struct FeatherParameters {
 
 ParameterList Describe(FeatherParameters& p);
 
+/// How deep a feather is that is as fine as the data: twice the length of their grain (mm; 0: not known, as much as four voxels
+/// are), at least three voxels, and at most the 3 mm of the default.
+double FeatherDepth(double grainMm, const Eigen::Vector3d& spacing);
+
 /// How much of the data a voxel shows: 0 outside the region, 1 at depths of featherMm or more, linear in between. Depth is the
 /// distance to the nearest voxel that shows background: outside of the region, but in \a backgroundRegion (empty: everywhere). So
 /// data do not fade where the background ends as well, nor at the ends of the grid.

@@ -2,12 +2,13 @@
 // In beam space the grain of speckle has the same shape all over the fan, so one autocorrelation along each axis tells it.
 //
 // 1. (Volumes) Beams are read from the volume by linear interpolation, as many as its voxels support.
-// 2. Standardise: local mean and deviation from LocalStatistics, whose window is stretched along the axes by its spacing. Samples
+// 2. Developed speckle: of the first window that is used the local mean and deviation decide which samples take part.
+// 3. Standardise: local mean and deviation from LocalStatistics, whose window is stretched along the axes by its spacing. Samples
 //    are replaced by (value - mean) / deviation, and those by the Rayleigh number of the same rank (a histogram of
 //    8192 bins). Flat places take no part.
-// 3. Correlate: sums of products at lags 1, 2, ... along each axis and in each band of depth, until all fell below one half.
+// 4. Correlate: sums of products at lags 1, 2, ... along each axis and in each band of depth, until all fell below one half.
 //
-// Passes 2 and 3 are done three times: the window follows the lengths that were found, up to the widest. A window of three
+// Steps 3 and 4 are done three times: the window follows the lengths that were found, up to the widest. A window of three
 // lengths takes 3% of the variance with it, which shortens the lengths by 2%; one of two lengths shortens them by 10%.
 #include "NoiseMatch.h"
 #include "Core/Base/Angles.h"
@@ -16,7 +17,7 @@
 #include "Core/Imaging/Sampling.h"
 #include "Core/Imaging/ScanConversion.h"
 #include "Core/Imaging/VoxelTypes.h"
-#include "LocalStatistics.h"
+#include "NoiseScores.h"
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -39,13 +40,20 @@ ParameterList Describe(NoiseMatchParameters& p)
   };
 }
 
+Eigen::Vector2d SpansHalfway(const ProbeGeometry& geometry)
+{
+  const double middle = 0.5 * (geometry.depthMin + geometry.depthMax);
+  return {std::abs(geometry.Fan().Span(middle)),
+          std::abs(geometry.Sweep().Span(geometry.Fan().PointOf({geometry.fanOffset, middle}).y()))};
+}
+
 namespace {
 
 constexpr std::ptrdiff_t leastSamples = 1000;
-constexpr double most = 24e6;         // samples that are read from a volume
-constexpr double windowLengths = 3.0; // standard deviation of the window, in lengths
-constexpr double cut = 5e-4;          // the brightest and darkest specks are the scene's
-constexpr double flat = 0.05;         // of the whole deviation: below this there is no texture
+constexpr double most = 24e6;             // samples that are read from a volume
+constexpr double windowLengths = 3.0;     // standard deviation of the window, in lengths
+constexpr double grainPerLength = 2.1289; // the integral of a Gaussian autocorrelation over all lags, in lengths
+constexpr double cut = 5e-4;              // the brightest and darkest specks are the scene's
 
 // The autocorrelation of a Rayleigh distributed envelope whose power has the autocorrelation \a power: a hypergeometric series.
 // Source: Middleton, Introduction to Statistical Communication Theory, 1960, section 9.1.
@@ -70,176 +78,6 @@ double PowerCorrelation(double envelope)
   }
   return 0.5 * (low + high);
 }
-
-// What stands for each sample; NaN where it takes no part.
-class Scores {
-public:
-  Scores(VolumeView<const float> beams, VolumeView<const unsigned char> valid)
-    : beams_(beams), valid_(valid), scores_(beams.Dimensions())
-  {
-    struct Sums {
-      double count = 0.0, first = 0.0;
-      float least = std::numeric_limits<float>::infinity(), greatest = -std::numeric_limits<float>::infinity();
-      Sums& operator+=(const Sums& other)
-      {
-        count += other.count;
-        first += other.first;
-        least = std::min(least, other.least);
-        greatest = std::max(greatest, other.greatest);
-        return *this;
-      }
-    };
-    const Sums sums = ParallelSum<Sums>(beams.Size(), 1 << 16, [this](std::ptrdiff_t begin, std::ptrdiff_t end) {
-      Sums part;
-      for (std::ptrdiff_t i = begin; i < end; ++i)
-        if (IsReal(i)) {
-          part.count += 1.0;
-          part.first += static_cast<double>(beams_[i]);
-          part.least = std::min(part.least, beams_[i]);
-          part.greatest = std::max(part.greatest, beams_[i]);
-        }
-      return part;
-    });
-    least_ = sums.least;
-    greatest_ = sums.greatest;
-    real_ = sums.count;
-    mean_ = sums.count > 0.0 ? sums.first / sums.count : 0.0;
-  }
-
-  double Mean() const { return mean_; }
-  double Deviation() const { return deviation_; }
-  float Least() const { return least_; }
-  float Greatest() const { return greatest_; }
-  VolumeView<const float> View() const { return scores_.View(); }
-
-  /// \param window standard deviations in samples \param local those of the last time, and then of this one
-  void Standardise(const Eigen::Vector3d& window, std::optional<LocalStatistics>& local, const Progress& progress)
-  {
-    local = LocalStatistics(beams_, valid_, window.cwiseInverse(), 1.0, progress.Part(0.0, 0.4), 0.0, false,
-                            local ? &*local : nullptr, &mean_);
-    const auto& n = beams_.Dimensions();
-    const std::ptrdiff_t rows = static_cast<std::ptrdiff_t>(n[1]) * n[2];
-    const VolumeView<float> scores = scores_.View();
-    // The deviation about the local means decides what is flat.
-    struct Squares {
-      double sum = 0.0;
-      Squares& operator+=(const Squares& other)
-      {
-        sum += other.sum;
-        return *this;
-      }
-    };
-    const auto forRow = [&](std::ptrdiff_t row, std::vector<float>& mean, std::vector<float>& deviation) {
-      local->Row(static_cast<int>(row % n[1]), static_cast<int>(row / n[1]), 0, n[0], mean.data(), deviation.data());
-      return row * n[0];
-    };
-    const Squares squares = ParallelSum<Squares>(rows, 64, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-      std::vector<float> mean(static_cast<std::size_t>(n[0])), deviation(mean.size());
-      Squares part;
-      for (std::ptrdiff_t row = begin; row < end; ++row) {
-        const std::ptrdiff_t first = forRow(row, mean, deviation);
-        for (int i = 0; i < n[0]; ++i)
-          if (IsReal(first + i)) {
-            const double rest = static_cast<double>(beams_[first + i] - mean[static_cast<std::size_t>(i)]);
-            part.sum += rest * rest;
-          }
-      }
-      return part;
-    });
-    deviation_ = real_ > 0.0 ? std::sqrt(squares.sum / real_) : 0.0;
-    const auto floor = static_cast<float>(std::max(flat * deviation_, 1e-5 * std::abs(mean_)));
-    ParallelRanges(rows, 64, progress.Part(0.4, 0.8), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-      std::vector<float> mean(static_cast<std::size_t>(n[0])), deviation(mean.size());
-      for (std::ptrdiff_t row = begin; row < end; ++row) {
-        const std::ptrdiff_t first = forRow(row, mean, deviation);
-        for (int i = 0; i < n[0]; ++i) {
-          const auto at = static_cast<std::size_t>(i);
-          scores[first + i] = IsReal(first + i) && deviation[at] > floor ? (beams_[first + i] - mean[at]) / deviation[at]
-                                                                         : std::numeric_limits<float>::quiet_NaN();
-        }
-      }
-    });
-    Count();
-  }
-
-  std::ptrdiff_t Used() const { return used_; }
-
-  /// The standardised value below which a part \a probability of the samples lies.
-  double Quantile(double probability) const
-  {
-    const double wanted = probability * static_cast<double>(used_);
-    double below = 0.0;
-    for (std::size_t b = 0; b < histogram_.size(); ++b) {
-      const double count = static_cast<double>(histogram_[b]);
-      if (count > 0.0 && below + count >= wanted)
-        return (static_cast<double>(b) + std::max(0.0, (wanted - below) / count)) / binsPerUnit - reach;
-      below += count;
-    }
-    return reach;
-  }
-
-  /// Ranks in place of values: the Rayleigh number with the same rank, less the mean of that distribution.
-  void Rank()
-  {
-    std::vector<float> table(bins);
-    double below = 0.0;
-    for (std::size_t b = 0; b < bins; ++b) {
-      const double rank = (below + 0.5 * static_cast<double>(histogram_[b])) / static_cast<double>(used_);
-      table[b] = static_cast<float>(std::sqrt(-2.0 * std::log1p(-std::min(rank, 1.0 - 1e-12))) - 1.2533141373155003);
-      below += static_cast<double>(histogram_[b]);
-    }
-    const VolumeView<float> scores = scores_.View();
-    ParallelRanges(scores.Size(), 1 << 16, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-      for (std::ptrdiff_t i = begin; i < end; ++i)
-        if (!std::isnan(scores[i]))
-          scores[i] = table[Bin(scores[i])];
-    });
-  }
-
-private:
-  static constexpr std::size_t bins = 8192;
-  static constexpr double reach = 8.0, binsPerUnit = bins / (2.0 * reach);
-
-  static std::size_t Bin(float value)
-  {
-    const double bin = (static_cast<double>(value) + reach) * binsPerUnit;
-    return static_cast<std::size_t>(std::min(std::max(bin, 0.0), static_cast<double>(bins - 1)));
-  }
-
-  bool IsReal(std::ptrdiff_t i) const { return (valid_.Empty() || valid_[i] != 0) && std::isfinite(beams_[i]); }
-
-  void Count()
-  {
-    struct Histogram {
-      std::vector<std::ptrdiff_t> counts = std::vector<std::ptrdiff_t>(bins);
-      Histogram& operator+=(const Histogram& other)
-      {
-        for (std::size_t b = 0; b < bins; ++b)
-          counts[b] += other.counts[b];
-        return *this;
-      }
-    };
-    const VolumeView<const float> scores = View();
-    histogram_ = ParallelSum<Histogram>(scores.Size(), 1 << 20, [&scores](std::ptrdiff_t begin, std::ptrdiff_t end) {
-                   Histogram part;
-                   for (std::ptrdiff_t i = begin; i < end; ++i)
-                     if (!std::isnan(scores[i]))
-                       ++part.counts[Bin(scores[i])];
-                   return part;
-                 }).counts;
-    used_ = 0;
-    for (const std::ptrdiff_t count : histogram_)
-      used_ += count;
-  }
-
-  VolumeView<const float> beams_;
-  VolumeView<const unsigned char> valid_;
-  Volume<float> scores_;
-  std::vector<std::ptrdiff_t> histogram_;
-  std::ptrdiff_t used_ = 0;
-  double mean_ = 0.0, deviation_ = 0.0, real_ = 0.0;
-  float least_ = 0.0f, greatest_ = 0.0f;
-};
 
 // Autocorrelations of the samples in one band of depth: sums of products and of the squares of both.
 struct Products {
@@ -366,11 +204,24 @@ void SetTypical(NoiseMatch& match, std::size_t axis)
   Along(match.lengths, axis) = resolved.empty() ? bound : resolved[at].first;
 }
 
+// Of the numbers that are some.
+double MeanOf(const std::vector<double>& numbers)
+{
+  double sum = 0.0, count = 0.0;
+  for (const double number : numbers)
+    if (std::isfinite(number)) {
+      sum += number;
+      count += 1.0;
+    }
+  return count > 0.0 ? sum / count : 0.0;
+}
+
 // How much interpolation between voxels has added along each axis of beam space at a depth: variance in samples squared.
 using AddedVariance = std::function<Eigen::Vector3d(double depthMm)>;
 
 // \param plain the same samples as they were before interpolation, which takes some of their deviation: for the quantiles
-NoiseMatch Match(VolumeView<const float> beams, VolumeView<const float> plain, VolumeView<const unsigned char> valid,
+// \param step of the intensities: 1 of whole numbers
+NoiseMatch Match(VolumeView<const float> beams, VolumeView<const float> plain, VolumeView<const unsigned char> valid, double step,
                  const ProbeGeometry& geometry, const Eigen::Vector3d& widest, const NoiseMatchParameters& parameters,
                  const AddedVariance& added, const Progress& progress)
 {
@@ -380,19 +231,25 @@ NoiseMatch Match(VolumeView<const float> beams, VolumeView<const float> plain, V
   for (int b = 0; b < parameters.depthBands; ++b)
     ranges.push_back({n[0] * b / parameters.depthBands, n[0] * (b + 1) / parameters.depthBands});
 
-  Scores scores(beams, valid);
+  NoiseScores scores(beams, valid);
   Eigen::Vector3d window = 0.5 * widest;
   std::optional<LocalStatistics> local;
-  const auto standardise = [&window, &local, &n](Scores& some, const Progress& part) {
+  const auto standardise = [&window, &local, &n](NoiseScores& some, const Progress& part) {
     for (int axis = 0; axis < 3; ++axis)
       window[axis] = std::min(std::max(window[axis], 2.0), static_cast<double>(n[static_cast<std::size_t>(axis)]));
     some.Standardise(window, local, part);
     if (some.Used() < leastSamples)
       FailForWantOfTexture("only " + std::to_string(some.Used()) + " samples of the fan are real and not flat");
   };
+  const double real = scores.Real();
   constexpr int passes = 3;
   for (int pass = 0; pass < passes; ++pass) {
     standardise(scores, progress.Part(0.25 * pass, 0.25 * (pass + 1)));
+    if (pass == 0) {
+      scores.KeepSpeckle(*local, step);
+      if (scores.Used() < leastSamples)
+        FailForWantOfTexture("only " + std::to_string(scores.Used()) + " samples of the fan lie in developed speckle");
+    }
     scores.Rank();
     for (int axis = 0; axis < axes && pass + 1 < passes; ++axis) {
       const std::vector<double> whole = HalfLags(scores.View(), {{0, n[0]}}, axis);
@@ -405,7 +262,11 @@ NoiseMatch Match(VolumeView<const float> beams, VolumeView<const float> plain, V
     lags[static_cast<std::size_t>(axis)] = HalfLags(scores.View(), ranges, axis);
 
   NoiseMatch match;
-  Scores values(plain, valid);
+  match.speckleShare = static_cast<double>(scores.Used()) / real;
+  match.grains = static_cast<double>(scores.Used());
+  for (int axis = 0; axis < axes; ++axis)
+    match.grains /= std::max(1.0, grainPerLength * MeanOf(lags[static_cast<std::size_t>(axis)]));
+  NoiseScores values(plain, scores.Valid());
   standardise(values, progress.Part(0.75, 1.0));
   match.mean = values.Mean();
   match.deviation = values.Deviation();
@@ -438,14 +299,6 @@ NoiseMatch Match(VolumeView<const float> beams, VolumeView<const float> plain, V
   for (int axis = 0; axis < axes; ++axis)
     SetTypical(match, static_cast<std::size_t>(axis));
   return match;
-}
-
-// mm per whole fan and per whole sweep halfway down the middle beam.
-Eigen::Vector2d SpansHalfway(const ProbeGeometry& geometry)
-{
-  const double middle = 0.5 * (geometry.depthMin + geometry.depthMax);
-  return {std::abs(geometry.Fan().Span(middle)),
-          std::abs(geometry.Sweep().Span(geometry.Fan().PointOf({geometry.fanOffset, middle}).y()))};
 }
 
 // Standard deviations of the window that is as wide as it may be, in samples.
@@ -497,7 +350,7 @@ NoiseMatch MatchBeams(VolumeView<const float> beams, VolumeView<const unsigned c
   if (!valid.Empty() && valid.Dimensions() != beams.Dimensions())
     throw Error(Error::Kind::BadInput, "noise match: the valid region does not have the dimensions of the beams");
   return Match(
-      beams, beams, valid, geometry, WidestWindow(parameters, geometry, beams.Dimensions()), parameters,
+      beams, beams, valid, 0.0, geometry, WidestWindow(parameters, geometry, beams.Dimensions()), parameters,
       [](double) { return Eigen::Vector3d::Zero().eval(); }, progress);
 }
 
@@ -549,8 +402,16 @@ NoiseMatch MatchNoise(const PosedVolume<T>& volume, const ProbeGeometry& geometr
     }
     return variance;
   };
-  return Match(std::as_const(beams).View(), std::as_const(plain).View(), std::as_const(valid).View(), geometry,
-               WidestWindow(parameters, geometry, n), parameters, added, progress.Part(0.3, 1.0));
+  return Match(std::as_const(beams).View(), std::as_const(plain).View(), std::as_const(valid).View(),
+               std::is_integral_v<T> ? 1.0 : 0.0, geometry, WidestWindow(parameters, geometry, n), parameters, added,
+               progress.Part(0.3, 1.0));
+}
+
+double GrainOf(const NoiseMatch& match, const ProbeGeometry& measured)
+{
+  const Eigen::Vector2d spans = SpansHalfway(measured);
+  const double area = match.lengths.depthMm * match.lengths.fan * spans[0];
+  return measured.IsPlane() ? std::sqrt(area) : std::cbrt(area * match.lengths.sweep * spans[1]);
 }
 
 BeamNoiseParameters NoiseLike(const NoiseMatch& match, const ProbeGeometry& measured, const ProbeGeometry& target)

@@ -39,10 +39,23 @@ struct NoiseMatch {
   std::vector<float> quantiles;
   double mean = 0.0;      ///< of the intensities
   double deviation = 0.0; ///< of the intensities about their local means (root mean square)
+  ///@{
+  /// What all this rests on: the part of the real samples that lies in developed speckle, and how many grains, each independent
+  /// of the others, there are in it.
+  double speckleShare = 0.0;
+  double grains = 0.0;
+  ///@}
+
+  /// Below it a length of the grain is off by more than a tenth in one of three volumes.
+  static constexpr double leastGrains = 400.0;
 };
 
 /// Measures the grain of a beam volume (see ScanConversion.h): the lag at which the autocorrelation of the speckle's power has
 /// fallen to one half, along each axis. \param valid 1 or 0; empty: every sample is real (samples that are not finite are not)
+///
+/// Developed speckle alone takes part: places whose local mean and deviation are those of many echoes. Left out are walls and
+/// wires (a deviation near the mean or above), what a grey level does not resolve, what is cut off at the ends of the range, and
+/// what is six times darker than the speckle that holds most of the power: water and shadows.
 ///
 /// Local mean and deviation (in a Gaussian window that three passes fit to the grain) are taken off, and ranks put in
 /// place of the values, so that neither the scene's brightness nor the machine's compression matters: the ranks
@@ -50,7 +63,7 @@ struct NoiseMatch {
 /// found between lags as that of a Gaussian. What is smooth over the window is no grain; edges of the scene that are as sharp as
 /// the grain are taken for it.
 /// Cost: proportional to the samples, with the lattices of local statistics; `./run bench noise` measures it.
-/// \throws Error(NotPossible) when there are less than 1000 samples with some texture around them, Error(BadInput) for
+/// \throws Error(NotPossible) when there are less than 1000 samples of developed speckle, Error(BadInput) for
 /// views that do not agree or are no beam volume, Error(InvalidParameter), Error(Cancelled)
 NoiseMatch MatchBeams(VolumeView<const float> beams, VolumeView<const unsigned char> valid, const ProbeGeometry& geometry,
                       const NoiseMatchParameters& parameters = {}, const Progress& progress = {});
@@ -63,6 +76,12 @@ NoiseMatch MatchBeams(VolumeView<const float> beams, VolumeView<const unsigned c
 template <class T>
 NoiseMatch MatchNoise(const PosedVolume<T>& volume, const ProbeGeometry& geometry, const Pose& probeToWorld,
                       const NoiseMatchParameters& parameters = {}, const Progress& progress = {});
+
+/// mm per whole fan and per whole sweep halfway down the middle beam.
+Eigen::Vector2d SpansHalfway(const ProbeGeometry& geometry);
+
+/// The length of the grain in mm halfway down, the geometric mean over the axes.
+double GrainOf(const NoiseMatch& match, const ProbeGeometry& measured);
 
 /// Noise like what was measured in the fan \a measured, for the fan \a target (which may be the same): lengths across fan and
 /// sweep are as many mm halfway down the target as they were halfway down the other. Counts resolve the lengths

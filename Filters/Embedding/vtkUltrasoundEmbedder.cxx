@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundEmbedder.h"
 
+#include "BackgroundNoise.h"
 #include "BeamNoise.h"
 #include "Core/Base/Memory.h"
+#include "Core/Base/NumberText.h"
 #include "Core/Base/SizeText.h"
 #include "Core/Geometry/EnclosingFan.h"
 #include "Core/Imaging/Sampling.h"
 #include "Core/Imaging/ScanConversion.h"
 #include "Embed.h"
 #include "FanFilling.h"
-#include "NoiseMatch.h"
 #include "NoiseTiling.h"
 #include "vtkUltrasoundAcquisition.h"
 #include "vtkUltrasoundFeather.h"
@@ -24,6 +25,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 using echorama::Error;
 using echorama::PlacedProbe;
@@ -38,6 +40,14 @@ bool IsSame(const PlacedProbe& a, const PlacedProbe& b)
     return std::array<double, 7>{g.fanAngle, g.fanWidth, g.sweepAngle, g.sweepWidth, g.depthMin, g.depthMax, g.fanOffset};
   };
   return numbers(a.geometry) == numbers(b.geometry) && a.probeToWorld.matrix() == b.probeToWorld.matrix();
+}
+
+// A number for people: two digits.
+std::string Rounded(double number)
+{
+  const int digits = number > 0.0 ? 1 - static_cast<int>(std::floor(std::log10(number))) : 0;
+  const double unit = std::pow(10.0, std::abs(digits));
+  return echorama::NumberText(digits > 0 ? std::round(number * unit) / unit : std::round(number / unit) * unit);
 }
 
 // Copies the tuples of an array of the data to their places on the grid; all others are 0.
@@ -61,8 +71,9 @@ vtkStandardNewMacro(vtkUltrasoundEmbedder);
 vtkUltrasoundParametersMacro(vtkUltrasoundEmbedder);
 
 struct vtkUltrasoundEmbedder::Settings {
+  Settings() { embed.featherMm = enclosing.marginMm = -1.0; } // as the data ask
   echorama::EmbedParameters embed;
-  echorama::EnclosingFanParameters enclosing{5.0, {}};
+  echorama::EnclosingFanParameters enclosing;
   echorama::NoiseTilingParameters tiling;
   bool matchGrain = true;
   std::uint64_t seed = 1;
@@ -74,13 +85,17 @@ echorama::ParameterList vtkUltrasoundEmbedder::Parameters()
 {
   using echorama::Parameter;
   Settings& v = *this->Values;
+  echorama::ParameterList embed = echorama::Without(Describe(v.embed), {"Exact", "Accuracy", "DiffusionVoxels"});
+  Parameter& feather = echorama::Named(embed, "FeatherMm");
+  feather.range.low = -1.0;
+  feather.help += " Below 0: twice the length of the grain of the data (where it is not known, four voxels), at most 3 mm.";
   return echorama::Join(
       {Describe(v.enclosing),
-       echorama::Without(Describe(v.embed), {"Exact", "Accuracy", "DiffusionVoxels"}),
+       embed,
        {Parameter(
            "MatchGrain", v.matchGrain,
            "Give noise that is made the grain of the data: its size along depth, fan and sweep, and its distribution. Where "
-           "the data have too little texture to tell, the grain is that of vtkUltrasoundNoiseSource.")},
+           "the data have too little speckle to tell, grains are two voxels long and three wide.")},
        echorama::Without(Describe(v.tiling), {"Columns", "Rows", "OverlapMm", "SpacingMm"}),
        {Parameter("Seed", v.seed, {0, 9223372036854775807.0}, "", "The same seed makes the same noise."),
         Parameter("PreviewFactor", v.previewFactor, {1, 64}, "",
@@ -155,7 +170,11 @@ const vtkUltrasoundEmbedder::Plan& vtkUltrasoundEmbedder::Prepare(vtkInformation
                                                      progress.Part(0.0, 0.3));
   }
   plan.Form = echorama::EncloseRegion(region.View(), geometry, enclosing, progress.Part(0.3, 0.9));
-  plan.Note = !shape                                ? "The outline is a fan that was found from the data."
+  const echorama::OutlineFamily family = echorama::FamilyOf(plan.Form.geometry);
+  const std::string kind = family == echorama::OutlineFamily::Linear   ? "box"
+                           : family == echorama::OutlineFamily::Phased ? "fan from a point"
+                                                                       : "fan";
+  plan.Note = !shape                                ? "The outline is a " + kind + " that was found from the data."
               : IsSame(plan.Form, *enclosing.shape) ? "The outline is the fan of the form."
                                                     : "The fan of the form does not hold all data: the outline is a larger one.";
 
@@ -180,18 +199,24 @@ void vtkUltrasoundEmbedder::MakeNoise(vtkInformationVector** inputs, const Plan&
   parameters = echorama::ResolvingCounts(parameters, plan.Form.geometry);
   std::string note = "The noise is made";
   if (this->Values->matchGrain && volumes.empty()) {
-    try {
-      vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
-        const auto match = echorama::MatchNoise(vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input), plan.Form.geometry,
-                                                plan.Form.probeToWorld, {}, progress.Part(0.0, 0.4));
-        parameters = echorama::NoiseLike(match, plan.Form.geometry, plan.Form.geometry);
-      });
-      note += ", with the grain of the data.";
-    } catch (const Error& error) {
-      if (error.GetKind() != Error::Kind::NotPossible) {
-        throw;
-      }
-      note += std::string(", with a grain of its own: ") + error.what() + ".";
+    echorama::BackgroundNoise behind;
+    vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
+      behind =
+          echorama::NoiseBehind(vtkUltrasoundVolume::PosedVolumeOf<decltype(type)>(input), plan.Form, progress.Part(0.0, 0.4));
+    });
+    parameters = behind.parameters;
+    this->SpeckleShare = behind.speckleShare;
+    this->SpeckleGrains = behind.grains;
+    this->GrainMm = behind.grainMm;
+    if (this->GetEnoughSpeckle()) {
+      note += ", with the grain of the data: " + Rounded(behind.grainMm) + " mm, measured on " + Rounded(behind.grains) +
+              " grains in " + Rounded(100.0 * behind.speckleShare) + "% of them.";
+    } else {
+      note += ", with a grain of its own" + (behind.reason.empty() ? "" : ": " + behind.reason) + ".";
+      this->Warning = "the data have too little speckle to tell its grain and brightness from (" + Rounded(behind.grains) +
+                      " grains; " + Rounded(echorama::NoiseMatch::leastGrains) +
+                      " are needed): the background is a guess, with grains of two by three voxels. Give noise volumes of the "
+                      "same scanner, or stitch views that hold more tissue";
     }
   } else {
     note += ".";
@@ -228,13 +253,17 @@ void vtkUltrasoundEmbedder::MakeNoise(vtkInformationVector** inputs, const Plan&
 void vtkUltrasoundEmbedder::Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress)
 {
   this->Notes.clear();
+  this->Warning.clear();
+  this->SpeckleShare = this->SpeckleGrains = -1.0;
+  this->GrainMm = 0.0;
   vtkImageData* image = vtkImageData::GetData(inputs[0]);
   const auto input = vtkUltrasoundVolume::CheckInput(this, image, "the input");
   const Plan& plan = this->Prepare(inputs, progress.Part(0.0, 0.1));
   const echorama::ImageGeometry& grid = plan.Grid.geometry;
   this->Notes = plan.Note + "\n";
 
-  const echorama::EmbedParameters& parameters = this->Values->embed;
+  echorama::EmbedParameters parameters = this->Values->embed;
+  parameters.featherMm = std::max(parameters.featherMm, 0.0);
   double bytes = echorama::EmbedMemory(parameters, grid);
   for (int i = 0; i < image->GetPointData()->GetNumberOfArrays(); ++i) {
     if (vtkDataArray* array = image->GetPointData()->GetArray(i)) {
@@ -275,12 +304,25 @@ void vtkUltrasoundEmbedder::Execute(vtkInformationVector** inputs, vtkImageData*
   Volume<float> noise(grid.dimensions);
   Volume<unsigned char> form(grid.dimensions);
   this->MakeNoise(inputs, plan, noise.View(), form.View(), progress.Part(0.1, 0.4));
+  if (this->Values->embed.featherMm < 0.0) {
+    parameters.featherMm = echorama::FeatherDepth(this->GrainMm, vtkUltrasoundVolume::GeometryOf(image).spacing);
+  }
+  this->UsedFeatherMm = parameters.featherMm;
   vtkUltrasoundVolume::Dispatch(intensity, [&](auto type) {
     using T = decltype(type);
     echorama::Embed<T>(parameters, region, grid.spacing, noise.View(), form.View(),
                        vtkUltrasoundVolume::ViewOf<T>(intensity, output),
                        vtkUltrasoundVolume::ViewOf<unsigned char>(labels, output), progress.Part(0.4, 1.0));
   });
+  if (!this->Warning.empty()) {
+    vtkWarningMacro(<< this->Warning);
+  }
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundEmbedder::GetEnoughSpeckle() const
+{
+  return this->SpeckleGrains < 0.0 || this->SpeckleGrains >= echorama::NoiseMatch::leastGrains;
 }
 
 //----------------------------------------------------------------------------
@@ -288,5 +330,8 @@ void vtkUltrasoundEmbedder::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
   vtkUltrasoundParameters::Print(os, indent, this->Parameters());
+  os << indent << "SpeckleGrains: " << this->SpeckleGrains << "\n";
+  os << indent << "SpeckleShare: " << this->SpeckleShare << "\n";
+  os << indent << "UsedFeatherMm: " << this->UsedFeatherMm << "\n";
   os << indent << "Notes: " << this->Notes << "\n";
 }

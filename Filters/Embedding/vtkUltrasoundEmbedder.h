@@ -14,7 +14,8 @@
  * that nothing invented passes as seen.
  *
  * Local mean and deviation of the data at their surface spread into the background (vtkUltrasoundSurfaceDiffuser), whose grain
- * gets them (vtkUltrasoundToneMapper); the border of the data fades into it (vtkUltrasoundFeather).
+ * gets them (vtkUltrasoundToneMapper); the border of the data fades into it (vtkUltrasoundFeather). Grain is measured in
+ * developed speckle alone; where there is too little of it a warning says so.
  *
  * Fails when nothing of the volume is valid, when it was embedded before (mixed voxels would pass as data), when no fan is known
  * of a noise volume, and when memory does not suffice.
@@ -55,12 +56,31 @@ public:
   void SetFormConnection(vtkAlgorithmOutput* output) { this->SetInputConnection(2, output); }
 
   // BEGIN parameters
-  /** How far the fan reaches beyond the centres of the voxels at least, in depth and to all sides. At least 0 mm; default 5. */
+  /**
+   * How far the fan reaches beyond the centres of the voxels at least, in depth and to all sides. Below 0: by a fortieth of the
+   * longest side of the data, at most 5 mm. At least -1 mm; default -1.
+   */
   vtkUltrasoundNumberMacro(MarginMm);
+
+  enum Outlines { AUTOMATIC = 0, LINEAR = 1, PHASED = 2, CURVED = 3 };
+
+  ///@{
+  /**
+   * The kind of probe whose beams give the outline, where no fan is given: linear makes a box, phased a fan from a single point,
+   * curved one that bends as it must. Automatic: the simplest that is at most 5% larger than the smallest, phased only where the
+   * data begin at a point. Default automatic. There are AUTOMATIC, LINEAR, PHASED, CURVED.
+   */
+  vtkUltrasoundChoiceMacro(Outline);
+  void SetOutlineToAutomatic() { this->SetOutline(AUTOMATIC); }
+  void SetOutlineToLinear() { this->SetOutline(LINEAR); }
+  void SetOutlineToPhased() { this->SetOutline(PHASED); }
+  void SetOutlineToCurved() { this->SetOutline(CURVED); }
+  ///@}
 
   /**
    * The depth in the data at which no background shows any more; from the border to there their share grows linearly. 0: a hard
-   * border. At least 0 mm; default 3.
+   * border. Below 0: twice the length of the grain of the data (where it is not known, four voxels), at most 3 mm. At least -1
+   * mm; default -1.
    */
   vtkUltrasoundNumberMacro(FeatherMm);
 
@@ -90,7 +110,7 @@ public:
 
   /**
    * Give noise that is made the grain of the data: its size along depth, fan and sweep, and its distribution. Where the data have
-   * too little texture to tell, the grain is that of vtkUltrasoundNoiseSource. Default on.
+   * too little speckle to tell, grains are two voxels long and three wide. Default on.
    */
   vtkUltrasoundSwitchMacro(MatchGrain);
 
@@ -117,6 +137,24 @@ public:
 
   /** Of the last volume: where the noise and the fan came from, sentences, one per line. */
   std::string GetNotes() const { return this->Notes; }
+
+  ///@{
+  /**
+   * Of the last volume whose grain was measured, else -1: how many independent grains of developed speckle it has, and in which
+   * part of it, [0, 1]. Water, walls, wires and shadows are none.
+   */
+  double GetSpeckleGrains() const { return this->SpeckleGrains; }
+  double GetSpeckleShare() const { return this->SpeckleShare; }
+  ///@}
+
+  /**
+   * False when that were too few grains to rely on (below 400): then there was a warning, and the background is a guess. True
+   * when nothing had to be measured.
+   */
+  bool GetEnoughSpeckle() const;
+
+  /** The depth of the feather of the last volume, mm: FeatherMm, or what took its place. */
+  double GetUsedFeatherMm() const { return this->UsedFeatherMm; }
 
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object
@@ -155,7 +193,10 @@ private:
   std::optional<Plan> Planned;
   PlanKey PlannedFor{};
 #endif
-  std::string Notes;
+  std::string Notes, Warning;
+  double SpeckleGrains = -1.0, SpeckleShare = -1.0;
+  double GrainMm = 0.0; // 0: not measured
+  double UsedFeatherMm = 0.0;
 };
 
 #endif

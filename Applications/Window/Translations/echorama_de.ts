@@ -2004,6 +2004,14 @@ tempo</translation>
         <translation>Weicher Rand</translation>
     </message>
     <message>
+        <source>automatic</source>
+        <translation>automatisch</translation>
+    </message>
+    <message>
+        <source>Kind of outline</source>
+        <translation>Art des Umrisses</translation>
+    </message>
+    <message>
         <source>Keep texture</source>
         <translation>Textur erhalten</translation>
     </message>

@@ -345,7 +345,7 @@ void TestResults::moreOptionsReachTheResult()
   QVERIFY(window.Part<QWidget>("FeatherMm")->isVisible());
   const int result = Make(window);
   const std::vector<double> first = Voxels(session->GetImage(result));
-  QCOMPARE(session->GetResultOption(result, "Embed.FeatherMm"), std::string("3"));
+  QCOMPARE(session->GetResultOption(result, "Embed.FeatherMm"), std::string("-1"));
   // The background is seen, though it is no data.
   const std::vector<double> real = Voxels(session->GetImage(result), "ValidRegion");
   const std::vector<double> shown = Voxels(session->GetShownImage(result), "ValidRegion");

@@ -160,6 +160,30 @@ TEST(Embed, AnechoicDataAtTheBorderStayDark)
   EXPECT_GT(bright / count, 35.0);
 }
 
+// A wall that runs out of dark data: it ends there, and does not light up the background around it.
+TEST(Embed, AWallDoesNotMakeTheBackgroundBright)
+{
+  Scene<unsigned char> scene;
+  for (int k = 0; k < size[2]; ++k)
+    for (int j = 0; j < size[1]; ++j)
+      for (int i = 0; i < size[0]; ++i)
+        if (scene.region.View()(i, j, k)) {
+          Random random(5, static_cast<std::uint64_t>((k * size[1] + j) * size[0] + i));
+          scene.data.View()(i, j, k) = static_cast<unsigned char>(j == 36 || j == 37 ? 200.0 : 8.0 + 4.0 * random.Uniform());
+        }
+  const Volume<unsigned char> result = scene.Run({});
+  double beside = 0.0, count = 0.0;
+  for (int k = 24; k < 36; ++k)
+    for (int j = 30; j < 44; ++j)
+      for (int i = 0; i < 10; ++i)
+        if (scene.LabelAt(&result.View()(i, j, k) - result.View().Data()) == EmbeddedVoxel::Invented) {
+          beside += result.View()(i, j, k);
+          count += 1.0;
+        }
+  ASSERT_GT(count, 800.0);
+  EXPECT_NEAR(beside / count, 10.0, 4.0); // the mean of the data there is 40
+}
+
 TEST(Embed, HolesIslandsAndAThinShell)
 {
   Scene<unsigned short> scene;

@@ -232,4 +232,14 @@ TEST(Feather, RefusesBadInput)
   EXPECT_THROW(scene.Run({1.0, true, 3.0}), Error);
 }
 
+TEST(Feather, ItsDepthFollowsTheResolution)
+{
+  const Eigen::Vector3d fine(0.2, 0.2, 0.25);
+  EXPECT_DOUBLE_EQ(FeatherDepth(0.45, fine), 0.9);
+  EXPECT_DOUBLE_EQ(FeatherDepth(0.1, fine), 0.6); // never less than three voxels
+  EXPECT_DOUBLE_EQ(FeatherDepth(0.0, fine), 0.8); // not known
+  EXPECT_DOUBLE_EQ(FeatherDepth(1.8, {0.8, 0.8, 0.8}), 3.0);
+  EXPECT_DOUBLE_EQ(FeatherDepth(0.0, {2.0, 2.0, 2.0}), 3.0);
+}
+
 } // namespace echorama

@@ -3,7 +3,7 @@
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include "Core/Imaging/ScanConversion.h"
-#include "Filters/Embedding/NoiseMatch.h"
+#include "Filters/Embedding/BackgroundNoise.h"
 #include "Testing/Sanitized.h"
 #include <algorithm>
 #include <cmath>
@@ -212,6 +212,94 @@ TEST(NoiseMatch, LengthsAcrossAWiderFanAreTheSameInMm)
   EXPECT_NEAR(p.fanCorrelation, 0.01, 1e-9);
   EXPECT_NEAR(p.sweepCorrelation, 0.02, 1e-9);
   EXPECT_EQ(p.depthCorrelationMm, 1.0);
+}
+
+// Speckle in a box of the fan, walls beyond it, and water that is not quite black: a few levels of receiver noise, one per voxel.
+Scene<unsigned char> Tank(const BeamNoiseParameters& p, double halfWidthMm)
+{
+  Scene<unsigned char> tank(p, 0.5);
+  const auto& n = tank.grid.dimensions;
+  const Eigen::Affine3d toWorld = tank.grid.IndexToWorld();
+  for (int k = 0; k < n[2]; ++k)
+    for (int j = 0; j < n[1]; ++j)
+      for (int i = 0; i < n[0]; ++i) {
+        const Eigen::Vector3d at = toWorld * Eigen::Vector3d(i, j, k);
+        Random random(9, static_cast<std::uint64_t>((k * n[1] + j) * n[0] + i));
+        unsigned char& voxel = tank.intensity.View()(i, j, k);
+        if (std::abs(at.x()) < halfWidthMm && std::abs(at.y()) < halfWidthMm && std::abs(at.z() - 30.0) < 12.0)
+          continue;
+        voxel = static_cast<unsigned char>(std::max(0.0, 3.5 + 1.7 * random.Normal()));
+        if (std::abs(at.z() - 50.0) < 1.5 || std::abs(at.z() - 8.0 - 0.1 * at.x()) < 1.0) // thicker than any grain
+          voxel = static_cast<unsigned char>(220.0 + 8.0 * random.Uniform());
+      }
+  return tank;
+}
+
+TEST(NoiseMatch, WaterAndWallsAreNoSpeckle)
+{
+  for (const NoiseIntensity kind : {NoiseIntensity::LogCompressed, NoiseIntensity::Rayleigh}) {
+    BeamNoiseParameters p = NoiseOf(0.9, 1.3, 1.5);
+    p.intensity = kind;
+    p.mean = kind == NoiseIntensity::Rayleigh ? 60.0 : 100.0;
+    const Scene<unsigned char> tank = Tank(p, 11.0);
+    const NoiseMatch match = tank.Match();
+    ExpectLengths(match.lengths, p, 0.15);
+    double box = 0.0, real = 0.0;
+    for (std::ptrdiff_t at = 0; at < tank.valid.View().Size(); ++at)
+      real += tank.valid.View()[at];
+    box = 22.0 * 22.0 * 24.0 / (0.5 * 0.5 * 0.5);
+    EXPECT_NEAR(match.speckleShare, box / real, 0.35 * box / real);
+    // As many grains as the integral of their autocorrelation makes: 2.13 lengths along each axis (a little more by
+    // interpolation).
+    const double grains = 22.0 * 22.0 * 24.0 / (std::pow(2.13, 3) * 0.9 * 1.3 * 1.5);
+    EXPECT_NEAR(match.grains, grains, 0.45 * grains);
+    EXPECT_NEAR(match.mean, p.mean, 0.15 * p.mean);
+  }
+}
+
+TEST(NoiseMatch, CountsTheGrains)
+{
+  const BeamNoiseParameters p = NoiseOf(0.9, 1.2, 1.2);
+  const NoiseMatch all = Scene<float>(p, 0.5).Match();
+  EXPECT_GT(all.speckleShare, 0.95);
+  EXPECT_GT(all.grains, NoiseMatch::leastGrains);
+  const NoiseMatch few = Tank(p, 4.0).Match();
+  EXPECT_LT(few.grains, NoiseMatch::leastGrains);
+  EXPECT_GT(few.grains, 20.0);
+}
+
+// Water alone, and water with walls: nothing to measure.
+TEST(NoiseMatch, RefusesATankWithoutSpeckle)
+{
+  const BeamNoiseParameters p = NoiseOf(0.9, 1.2, 1.2);
+  Scene<unsigned char> tank = Tank(p, 0.0);
+  for (unsigned char& voxel : tank.intensity.View())
+    voxel = voxel < 20 ? voxel / 3 : voxel; // cut off at black, mostly
+  try {
+    tank.Match();
+    ADD_FAILURE() << "it was not refused";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.GetKind(), Error::Kind::NotPossible);
+    EXPECT_NE(std::string(error.what()).find("developed speckle"), std::string::npos) << error.what();
+  }
+}
+
+TEST(NoiseMatch, TheBackgroundOfATankIsAsFineAsItsVoxels)
+{
+  const BeamNoiseParameters p = NoiseOf(1.1, 2.2, 2.2);
+  const BackgroundNoise enough = NoiseBehind(Scene<float>(p, 0.5).Posed(), {probe, Pose::Identity()});
+  EXPECT_NEAR(enough.parameters.depthCorrelationMm, 1.1, 0.17);
+  EXPECT_NEAR(enough.grainMm, std::cbrt(1.1 * 2.2 * 2.2), 0.25);
+  EXPECT_TRUE(enough.reason.empty());
+  for (const double halfWidthMm : {0.0, 4.0}) { // nothing, and too little
+    const BackgroundNoise guess = NoiseBehind(Tank(p, halfWidthMm).Posed(), {probe, Pose::Identity()});
+    EXPECT_EQ(guess.grainMm, 0.0);
+    EXPECT_LT(guess.grains, NoiseMatch::leastGrains);
+    EXPECT_NEAR(guess.parameters.depthCorrelationMm, 1.0, 1e-9);
+    EXPECT_NEAR(guess.parameters.fanCorrelation * probe.Fan().Span(30.0), 1.5, 1e-9);
+    EXPECT_NEAR(guess.parameters.sweepCorrelation * probe.Sweep().Span(30.0), 1.5, 0.2);
+    EXPECT_NO_THROW(MakeBeamNoise(guess.parameters, probe));
+  }
 }
 
 TEST(NoiseMatch, RefusesWhatHasNoTexture)

@@ -136,7 +136,48 @@ result, filter = run(box(ValidRegion=one), FeatherMm=0)
 assert result and (arrays(result)["Embedding"] == 1).sum() == 1
 assert "a grain of its own" in filter.GetNotes()
 
-# 6. Blocks that are older than the filter, and lie elsewhere, keep their places; so do volumes that a source exchanges.
+# 6. Where there is too little speckle it says so, and what it is of: a tank of water with a wall and a block of speckle.
+def tank(block):
+    shape = (70, 60, 64)
+    chance = np.random.default_rng(7)
+    voxels = np.maximum(2 + 1.2 * chance.standard_normal(shape), 0)
+    voxels[:, :, 50:53] = 230
+    if block:
+        real, imaginary = chance.standard_normal((2, *shape))
+        for axis in range(3): # grains of some voxels
+            real, imaginary = (part + np.roll(part, 1, axis) for part in (real, imaginary))
+        voxels[20:, 20:, :40] = (18 * np.hypot(real, imaginary))[20:, 20:, :40]
+    image = vtkImageData()
+    image.SetDimensions(shape)
+    image.SetSpacing(0.25, 0.25, 0.25)
+    put(image, "Intensity", np.minimum(voxels, 255).astype(np.uint8))
+    return image
+
+
+for block in (False, True):
+    warnings = []
+    image = tank(block)
+    filter = echorama.vtkUltrasoundEmbedder()
+    filter.SetInputData(image)
+    filter.AddObserver(vtkCommand.WarningEvent, lambda *_: warnings.append(1))
+    filter.Update()
+    first, labels = check(image, filter.GetOutput())
+    assert filter.GetEnoughSpeckle() == block and len(warnings) == (not block)
+    assert (filter.GetSpeckleGrains() > 400) == block and "box" in filter.GetNotes()
+    assert 0.15 < filter.GetSpeckleShare() < 0.45 if block else filter.GetSpeckleShare() < 0.05
+    assert ("with the grain of the data" if block else "a grain of its own") in filter.GetNotes(), filter.GetNotes()
+    # The border is as fine as the data, and so is the margin; both can be set.
+    assert 0.75 <= filter.GetUsedFeatherMm() < 2 and (labels == 2).mean() < 0.25
+    assert (labels == 3).mean() < 0.25
+    # Beside the wall, which runs to the border, the background is as dark as the water.
+    invented = arrays(filter.GetOutput())["Intensity"][:first[0], first[1] + 5:first[1] + 55, first[2] + 44:first[2] + 59]
+    assert invented.size and invented.mean() < 12, invented.mean()
+result, filter = run(tank(True), FeatherMm=1.5, MarginMm=4, Outline=3)
+assert filter.GetUsedFeatherMm() == 1.5
+assert result.GetFieldData().GetArray("ProbeGeometry").GetTuple(0)[5] > 15.9 + 8
+assert run(tank(True), MatchGrain=False)[1].GetSpeckleGrains() == -1
+
+# 7. Blocks that are older than the filter, and lie elsewhere, keep their places; so do volumes that a source exchanges.
 first_block, second_block = box(), box(shape=(30, 40, 36))
 second_block.SetOrigin(100, 50, -30)
 from vtkmodules.vtkCommonDataModel import vtkMultiBlockDataSet
@@ -159,7 +200,7 @@ producer.SetOutput(second_block)
 filter.Update()
 check(second_block, filter.GetOutput())
 
-# 7. What is refused: nothing valid, a form without a fan, what was embedded before.
+# 8. What is refused: nothing valid, a form without a fan, what was embedded before.
 assert run(run(box())[0])[0] is None
 assert run(box(ValidRegion=np.zeros((40, 36, 44), np.uint8)))[0] is None
 assert run(box(ValidRegion=one.astype(np.int16)))[0] is None
