@@ -15,9 +15,9 @@ namespace echorama {
 namespace {
 
 constexpr double flat = 0.05; // of the whole deviation: below this there is no texture
-// Developed speckle has a deviation of 0.52 of its mean, less after compression, and 1 of its power. Walls and wires among
+// Developed speckle has a deviation of 0.52 of its mean, less after compression. Walls and wires among
 // darkness, and darkness that is cut off at black, have more; what is smooth has less.
-constexpr double mostSpeckleContrast = 0.9, leastSpeckleContrast = 0.05;
+constexpr double mostSpeckleContrast = 0.75, leastSpeckleContrast = 0.05;
 constexpr double darkestSpeckle = 1.0 / 6.0; // of the level of the speckle: water and shadows are darker
 
 constexpr std::size_t levels = 320; // eight to the octave
