@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundReader.h"
 
-#include "Core/Imaging/BorderZeros.h"
+#include "BorderZeros.h"
 #include "Readers/DataFile.h"
 #include "Readers/SequenceFile.h"
 #include "Readers/VolumeFile.h"

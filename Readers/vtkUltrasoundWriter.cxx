@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundWriter.h"
 
+#include "BorderZeros.h"
 #include "Core/Base/FileReplacement.h"
 #include "Core/Base/NumberText.h"
-#include "Core/Imaging/BorderZeros.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/NiftiFile.h"
 #include "Readers/SequenceFile.h"

@@ -626,29 +626,6 @@ OutlineFamily FamilyOf(const ProbeGeometry& geometry)
   return geometry.fanWidth == 0.0 && geometry.sweepWidth == 0.0 ? OutlineFamily::Phased : OutlineFamily::Curved;
 }
 
-double FanVolume(const ProbeGeometry& geometry)
-{
-  // Over depth the area is a polynomial of degree 2 at most (Simpson's rule is exact), over the fan it is smooth (Gauss).
-  constexpr int nodes = 5;
-  constexpr double places[nodes] = {0.0, 0.2692346550528415, -0.2692346550528415, 0.4530899229693320, -0.4530899229693320};
-  constexpr double shares[nodes] = {0.2844444444444444, 0.2393143352496832, 0.2393143352496832, 0.1184634425280945,
-                                    0.1184634425280945};
-  const double depths[3] = {geometry.depthMin, 0.5 * (geometry.depthMin + geometry.depthMax), geometry.depthMax};
-  const double parts[3] = {1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0};
-  double sum = 0.0;
-  for (int d = 0; d < 3; ++d) {
-    double across = 1.0;
-    if (!geometry.IsPlane()) {
-      across = 0.0;
-      for (int f = 0; f < nodes; ++f)
-        across +=
-            shares[f] * std::abs(geometry.Sweep().Span(geometry.Fan().PointOf({places[f] + geometry.fanOffset, depths[d]}).y()));
-    }
-    sum += parts[d] * geometry.Fan().Span(depths[d]) * across;
-  }
-  return sum * (geometry.depthMax - geometry.depthMin);
-}
-
 PlacedProbe EncloseRegion(VolumeView<const unsigned char> valid, const ImageGeometry& geometry,
                           const EnclosingFanParameters& parameters, const Progress& progress)
 {

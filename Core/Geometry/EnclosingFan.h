@@ -2,7 +2,7 @@
 #pragma once
 #include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
-#include "Core/Geometry/ProbeGeometry.h"
+#include "Core/Geometry/FanModel.h"
 #include "Core/Imaging/VolumeView.h"
 #include <optional>
 
@@ -51,8 +51,5 @@ PlacedProbe EncloseRegion(VolumeView<const unsigned char> valid, const ImageGeom
 
 /// The family of a probe's outline.
 OutlineFamily FamilyOf(const ProbeGeometry& geometry);
-
-/// How much space the beams of a probe fill: mm^3; of a single plane mm^2.
-double FanVolume(const ProbeGeometry& geometry);
 
 } // namespace echorama

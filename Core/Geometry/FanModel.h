@@ -42,4 +42,7 @@ FanPlace LocateInFan(const ProbeGeometry& shape, const Eigen::Vector3d& inProbe)
 /// How that distance changes with the unknowns. \param at LocateInFan of the point
 FanVector FanGradient(const ProbeGeometry& shape, const Eigen::Vector3d& inProbe, FanPlace at);
 
+/// How much space the beams of a probe fill: mm^3; of a single plane mm^2.
+double FanVolume(const ProbeGeometry& geometry);
+
 } // namespace echorama

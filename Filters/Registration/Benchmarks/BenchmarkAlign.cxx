@@ -17,13 +17,13 @@
 //
 //   BenchmarkAlign [TRIALS [CASE...]]     default: 8 of each case: near far liver; and on request: anywhere
 #include "Core/Base/Random.h"
-#include "Core/Imaging/BorderZeros.h"
 #include "Core/Imaging/ValidPoints.h"
 #include "Filters/Phantoms/Phantom.h"
 #include "Filters/Phantoms/PhantomViews.h"
 #include "Filters/Registration/AlignmentScore.h"
 #include "Filters/Registration/AlignPair.h"
 #include "Filters/Registration/PreparedVolume.h"
+#include "Readers/BorderZeros.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/VolumeFile.h"
 #include "Testing/Benchmark.h"

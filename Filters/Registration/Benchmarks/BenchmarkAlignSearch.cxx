@@ -7,10 +7,10 @@
 //
 //   BenchmarkAlignSearch FIXED.mha MOVING.mha [t]    aligns two volumes of files, as the study asks: one line of JSON
 #include "Core/Base/Random.h"
-#include "Core/Imaging/BorderZeros.h"
 #include "Core/Imaging/ValidPoints.h"
 #include "Filters/Registration/AlignmentScore.h"
 #include "Filters/Registration/Benchmarks/AlignSearch.h"
+#include "Readers/BorderZeros.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/VolumeFile.h"
 #include "Readers/VoxelType.h"

@@ -9,12 +9,12 @@
 //
 // Arguments: trials of each pair (3), pairs of phantoms (4), 1 to leave out full covers of rotations.
 #include "Core/Base/Random.h"
-#include "Core/Imaging/BorderZeros.h"
 #include "Core/Imaging/ValidPoints.h"
 #include "Filters/Phantoms/Phantom.h"
 #include "Filters/Phantoms/PhantomViews.h"
 #include "Filters/Registration/GlobalSearch.h"
 #include "Filters/Registration/MaskedCorrelation.h"
+#include "Readers/BorderZeros.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/VolumeFile.h"
 #include "Testing/Benchmark.h"

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // The volumes that benchmarks align: views of the phantom, and real ones.
-#include "Core/Imaging/BorderZeros.h"
 #include "Filters/Phantoms/Phantom.h"
 #include "Filters/Phantoms/PhantomViews.h"
 #include "Filters/Registration/Pyramid.h"
+#include "Readers/BorderZeros.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/VolumeFile.h"
 #include <string>

@@ -2,7 +2,7 @@
 // Runs of zeros along x are the nodes of a union-find: one pass over the voxels finds the runs and joins each with those
 // that it touches in the row and in the slice before; runs at the border join node 0, the outside. A second pass over the
 // runs marks those of the outside. Cost: one look at every voxel, and 12 bytes per run.
-#include "Core/Imaging/BorderZeros.h"
+#include "BorderZeros.h"
 #include "Core/Base/JoinedSets.h"
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Random.h"
-#include "Core/Imaging/BorderZeros.h"
+#include "Readers/BorderZeros.h"
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
