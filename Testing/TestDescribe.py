@@ -82,7 +82,7 @@ class Slicer(unittest.TestCase):
                 for output, extra in zip(outputs, ([], words)):
                     files = [folder / (output.name if name == "form.nrrd" else name) for name in inputs]
                     target = [] if command == "convert" else ["-o", output]
-                    done = run(command, *extra, *files, *target)
+                    done = run(command, *extra, *target, *files)
                     self.assertEqual(done.returncode, 0, f"{command} {extra}: {done.stderr}")
                 self.assertEqual(outputs[0].read_bytes(), outputs[1].read_bytes(), command)
                 for output in outputs:

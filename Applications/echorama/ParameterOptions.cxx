@@ -81,7 +81,7 @@ CLI::Option* AddParameter(CLI::App* options, Parameter parameter, std::string fl
   CLI::Option* option = options->add_option_function<std::vector<std::string>>(flag, set, help)->expected(isVector ? 3 : 1);
   const auto* choice = std::get_if<Choice>(&parameter.value);
   option->type_name(choice ? "" : isVector ? "X Y Z" : std::holds_alternative<std::string*>(parameter.value) ? "TEXT" : "NUMBER");
-  option->default_str(parameter.Text());
+  option->default_str(parameter.Text())->allow_extra_args(false); // files may follow
   if (isVector)
     option->delimiter(','); // 3D Slicer writes 1,2,3
   Known().emplace(option, std::move(parameter));

@@ -53,35 +53,55 @@ void Load(CLI::App* options, Action& action)
   add(options, action);
 }
 
+constexpr const char* ExitStatus =
+    "Exit status: 0 done, 1 it could not be done, 2 wrong usage, 3 done, but the result must be checked (align, calibrate).";
+
+struct Common {
+  bool json = false;
+  int threads = 0;
+  Action action; // of the command that was chosen
+};
+
+void Load(CLI::App* options, Common& common)
+{
+  Load(options, common.action);
+  options->add_flag("--json", common.json, "Print one JSON object of results and seconds on standard output");
+  options->add_option("--threads", common.threads, "Number of threads (0: as many as there are cores)")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+}
+
 // What the program or one of its commands says of itself for other programs: echorama [COMMAND...] --xml, --man or --completion.
-bool Describe(CLI::App& program, const std::vector<std::string>& words)
+// \returns false when something else was asked for.
+bool Describe(CLI::App& program, Common& common, const std::vector<std::string>& words)
 {
   const std::string what = words.empty() ? "" : words.back();
   if (what != "--xml" && what != "--man" && what != "--completion")
     return false;
   CLI::App* app = &program;
   std::string name;
-  Action unused;
   for (std::size_t i = 0; i + 1 < words.size(); ++i) {
     const std::vector<CLI::App*> found = app->get_subcommands([&](const CLI::App* each) { return each->get_name() == words[i]; });
     if (found.empty())
-      return false; // the parser says why
+      Misused(words[i] + ": there is no such command");
     app = found.front();
     if (i == 0)
-      Load(app, unused);
+      Load(app, common);
     name += (i == 0 ? "" : " ") + words[i];
   }
-  const bool isWhole = app == &program, isLeaf = !isWhole && app->get_subcommands([](const CLI::App*) { return true; }).empty();
+  const auto all = [](const CLI::App*) { return true; };
   if (what == "--man") {
-    std::cout << ManPage(*app, name, program.get_footer());
-  } else if (what == "--xml" && isLeaf) {
+    std::cout << ManPage(*app, name, ExitStatus);
+  } else if (what == "--xml") {
+    if (!app->get_subcommands(all).empty())
+      Misused("--xml: of a single command, as echorama align --xml");
     std::cout << SlicerDescription(*app, name);
-  } else if (what == "--completion" && isWhole) {
-    for (CLI::App* each : program.get_subcommands([](const CLI::App*) { return true; }))
-      Load(each, unused);
-    std::cout << BashCompletion(program);
   } else {
-    return false;
+    if (app != &program)
+      Misused("--completion: of all commands at once, echorama --completion");
+    for (CLI::App* each : program.get_subcommands(all))
+      Load(each, common);
+    std::cout << BashCompletion(program);
   }
   return true;
 }
@@ -110,33 +130,23 @@ int main(int argc, char** argv)
   CLI::App program("Reconstruct, align, stitch, embed and look at 3D ultrasound volumes.", "echorama");
   program.set_version_flag("--version", "echorama " ECHORAMA_VERSION);
   program.require_subcommand(1);
-  program.footer(
-      "Every subcommand explains itself: echorama align --help\n"
-      "Exit status: 0 done, 1 it could not be done, 2 wrong usage, 3 done, but the result must be checked (align, calibrate).");
+  program.footer(std::string("Every subcommand explains itself: echorama align --help\n") + ExitStatus);
 
-  bool json = false;
-  int threads = 0;
-  Action action; // of the command that was chosen
+  Common common;
   for (const auto& command : Commands) {
     CLI::App* options = program.add_subcommand(command.name, command.help);
-    options->preparse_callback([&, options](std::size_t) { // before its options are read
-      Load(options, action);
-      options->add_flag("--json", json, "Print one JSON object of results and seconds on standard output");
-      options->add_option("--threads", threads, "Number of threads (0: as many as there are cores)")
-          ->check(CLI::Range(0, 1024))
-          ->capture_default_str();
-    });
+    options->preparse_callback([&common, options](std::size_t) { Load(options, common); }); // before its options are read
   }
 
   const auto fail = [&](const std::string& name, const std::string& reason, int status) {
     // The parser may have stopped before it came to --json.
     for (int i = 1; i < argc; ++i)
-      json = json || std::strcmp(argv[i], "--json") == 0;
-    return Session(name, json).Fail(reason, status);
+      common.json = common.json || std::strcmp(argv[i], "--json") == 0;
+    return Session(name, common.json).Fail(reason, status);
   };
   const auto chosen = [&program] { return program.get_subcommands().empty() ? nullptr : program.get_subcommands().front(); };
   try {
-    if (Describe(program, {argv + 1, argv + argc}))
+    if (Describe(program, common, {argv + 1, argv + argc}))
       return 0;
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -148,8 +158,9 @@ int main(int argc, char** argv)
     const bool unknown = !chosen() && argc > 1 && argv[1][0] != '-';
     const std::string reason = unknown ? argv[1] + std::string(": there is no such command") : error.what();
     return fail(chosen() ? chosen()->get_name() : "", reason + " (see " + path + "--help)", ExitMisused);
-  } catch (const Error& error) { // it cannot be loaded
-    return fail(chosen()->get_name(), error.what(), ExitFailed);
+  } catch (const Error& error) { // it cannot be loaded, or cannot say that of itself
+    return fail(chosen() ? chosen()->get_name() : "", error.what(),
+                error.GetKind() == Error::Kind::InvalidParameter ? ExitMisused : ExitFailed);
   }
-  return Run(chosen()->get_name(), action, json, threads);
+  return Run(chosen()->get_name(), common.action, common.json, common.threads);
 }

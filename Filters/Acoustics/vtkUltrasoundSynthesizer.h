@@ -208,25 +208,6 @@ public:
   /** The most straight pieces of one ray's way: a stop for scenes of many mirrors. In [1, 100000000]; default 10000. */
   vtkUltrasoundIntegerMacro(MaxSegments);
 
-  /** Rays of an element, spread over its aperture. 1: the axis alone, fast and hard-edged. In [1, 4096]; default 8. */
-  vtkUltrasoundIntegerMacro(SubRays);
-
-  enum Samplings { RANDOM = 0, STRATIFIED = 1, SOBOL = 2 };
-
-  ///@{
-  /** How the rays of an element are spread. Default stratified. There are RANDOM, STRATIFIED, SOBOL. */
-  vtkUltrasoundChoiceMacro(Sampling);
-  void SetSamplingToRandom() { this->SetSampling(RANDOM); }
-  void SetSamplingToStratified() { this->SetSampling(STRATIFIED); }
-  void SetSamplingToSobol() { this->SetSampling(SOBOL); }
-  ///@}
-
-  /**
-   * Whether a beam is bent and shaded as a whole, by the mean of its rays and of those of its neighbours within its width; off:
-   * bent along its axis alone. Used when Mode is coherent. Default off.
-   */
-  vtkUltrasoundSwitchMacro(WideBeams);
-
   /**
    * Side lobes on either side of each beam along the fan; each costs about as much as the beam itself. 0: none. In [0, 20];
    * default 0.
@@ -254,6 +235,25 @@ public:
 
   /** How wide an element is; narrow ones hear more of grating lobes. In [0.01, 1] pitches; default 0.9. */
   vtkUltrasoundNumberMacro(ElementWidth);
+
+  /** Rays of an element, spread over its aperture. 1: the axis alone, fast and hard-edged. In [1, 4096]; default 8. */
+  vtkUltrasoundIntegerMacro(SubRays);
+
+  enum Samplings { RANDOM = 0, STRATIFIED = 1, SOBOL = 2 };
+
+  ///@{
+  /** How the rays of an element are spread. Default stratified. There are RANDOM, STRATIFIED, SOBOL. */
+  vtkUltrasoundChoiceMacro(Sampling);
+  void SetSamplingToRandom() { this->SetSampling(RANDOM); }
+  void SetSamplingToStratified() { this->SetSampling(STRATIFIED); }
+  void SetSamplingToSobol() { this->SetSampling(SOBOL); }
+  ///@}
+
+  /**
+   * Whether a beam is bent and shaded as a whole, by the mean of its rays and of those of its neighbours within its width; off:
+   * bent along its axis alone. Used when Mode is coherent. Default off.
+   */
+  vtkUltrasoundSwitchMacro(WideBeams);
 
   /**
    * Level of the echo of a perfect mirror, square to the beam, beside the mean speckle of the reference tissue. In [0, 120] dB;

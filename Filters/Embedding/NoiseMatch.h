@@ -54,8 +54,8 @@ struct NoiseMatch {
 /// fallen to one half, along each axis. \param valid 1 or 0; empty: every sample is real (samples that are not finite are not)
 ///
 /// Developed speckle alone takes part: places whose local mean and deviation are those of many echoes. Left out are walls and
-/// wires (a deviation of more than three quarters of the mean), what is smooth, what a grey level does not resolve, what is cut off at the ends of the range, and
-/// what is six times darker than the speckle that holds most of the power: water and shadows.
+/// wires (a deviation of more than three quarters of the mean), what is smooth, what a grey level does not resolve, what is cut
+/// off at the ends of the range, and what is six times darker than the speckle that holds most of the power: water and shadows.
 ///
 /// Local mean and deviation (in a Gaussian window that three passes fit to the grain) are taken off, and ranks put in
 /// place of the values, so that neither the scene's brightness nor the machine's compression matters: the ranks
