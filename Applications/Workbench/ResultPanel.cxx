@@ -111,7 +111,8 @@ void ResultPanel::MakeFields()
   embed_ = CheckField(this, "embed", tr("Embed in a background"),
                       tr("Puts the result into the fan that holds it, in noise of its own brightness and grain"),
                       [this](bool) { ShowState(); });
-  margin_ = NumberField(this, {"embedMargin", HelpOf(embedding, "MarginMm"), 0.0, 200.0, 2, 1.0, tr(" mm")});
+  margin_ = NumberField(this, {"embedMargin", HelpOf(embedding, "MarginMm"), -1.0, 200.0, 2, 1.0, tr(" mm")});
+  margin_->setSpecialValueText(tr("automatic"));
   for (QComboBox* field : {method_, texture_}) // what matters below depends on them
     connect(field, qOverload<int>(&QComboBox::currentIndexChanged), this, [this] {
       TakeFields();

@@ -346,6 +346,7 @@ void TestResults::moreOptionsReachTheResult()
   const int result = Make(window);
   const std::vector<double> first = Voxels(session->GetImage(result));
   QCOMPARE(session->GetResultOption(result, "Embed.FeatherMm"), std::string("-1"));
+  QCOMPARE(session->GetResultOption(result, "Embed.MarginMm"), std::string("-1"));
   // The background is seen, though it is no data.
   const std::vector<double> real = Voxels(session->GetImage(result), "ValidRegion");
   const std::vector<double> shown = Voxels(session->GetShownImage(result), "ValidRegion");
@@ -374,12 +375,20 @@ void TestResults::moreOptionsReachTheResult()
   QVERIFY2(window.HasMessage("/nowhere/noise.mha"), qPrintable(window.Messages().join('\n')));
   QCOMPARE(session->GetUndoCount(), entries);
   window.Part<QLineEdit>("embedNoise")->clear();
+  // These volumes are boxes. Another kind of outline makes another background; that of a source comes before it.
+  auto* outline = window.Part<QComboBox>("Outline");
+  outline->setFocus();
+  QTest::keyClick(outline, Qt::Key_End);
+  Make(window);
+  QCOMPARE(session->GetResultOption(result, "Embed.Outline"), std::string("curved"));
+  const std::vector<double> curved = Voxels(session->GetImage(result));
+  QVERIFY(curved != other);
   auto* form = window.Part<QComboBox>("embedForm");
   QCOMPARE(form->count(), 3);
   form->setCurrentIndex(2);
   Make(window);
   QCOMPARE(session->GetResultOption(result, "Form"), std::string("2"));
-  QVERIFY(Voxels(session->GetImage(result)) != other);
+  QVERIFY(Voxels(session->GetImage(result)) != curved);
 }
 
 void TestResults::whatIsMadeDuringADragWaitsForItsEnd()
