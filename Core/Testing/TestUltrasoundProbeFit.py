@@ -127,7 +127,7 @@ def check_refusals():
     assert not errors and 0 < filter.GetOverlap() < 0.85
     filter, errors = fit(image_of(grey, np.zeros_like(ball)))
     assert len(errors) == 1 and "empty" in errors[0], errors
-    for name, wrong in (("MinimumOverlap", 7), ("MaximumDistance", -1), ("OutlinePoints", 3), ("MarginMm", -1)):
+    for name, wrong in (("MinimumOverlap", 7), ("MaximumDistance", -1), ("OutlinePoints", 3), ("MarginMm", -2)):
         filter, errors = fit(image_of(grey, ball), **{name: wrong})
         assert len(errors) == 1 and f"{name} is {wrong}" in errors[0], errors
 
