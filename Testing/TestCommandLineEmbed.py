@@ -115,11 +115,13 @@ class Embed(unittest.TestCase):
                 place, weight = np.array([11, 12, x]), (x - 5) / feather
                 self.assertAlmostEqual(grey[tuple(place + first)], weight * 100 + (1 - weight) * spread(place, inside), delta=0.8, msg=f"{x}")
 
-        # By themselves margin and feather follow the data: a fortieth of 13 mm, and four voxels are more than 3 mm.
+        # By themselves margin and feather follow the data: a fortieth of 13 mm, in which there is no voxel, so that nothing is invented;
+        # and four voxels are more than 3 mm.
         told, first, grey, labels = embedded("--smooth", 0.001)
         self.assertAlmostEqual(told["ProbeGeometry"]["depth_mm"][1], 14 + 2 * 13 / 40, delta=1e-3)
-        self.assertEqual(told["feather_mm"], 3)
-        self.assertEqual(told["voxels_data"], 10**3)
+        self.assertEqual((told["feather_mm"], told["voxels_data"], told["voxels_blend"]), (3, 14**3, 0))
+        told, first, grey, labels = embedded("--smooth", 0.001, "--margin", 1)
+        self.assertEqual((told["feather_mm"], told["voxels_data"]), (3, 10**3))
 
         # Every third voxel, from the second: the middle of three.
         told, first, grey, labels = embedded("--preview", 3)
