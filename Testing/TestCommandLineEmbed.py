@@ -132,11 +132,11 @@ class Embed(unittest.TestCase):
         np.testing.assert_array_equal(np.sort(grey[known]), np.sort(voxels[third][valid[third] == 1]))  # the feather is no thicker than a voxel
 
         # Where all of it is grain, the background has the mean and the deviation of the whole cube; with --no-contrast that of the noise.
-        told, _, grey, labels = embedded("--smooth", 1000)
+        told, _, grey, labels = embedded("--smooth", 1000, "--margin", 5)
         real, invented = voxels[valid == 1].astype(float), grey[labels == 3].astype(float)
         self.assertAlmostEqual(invented.mean(), real.mean(), delta=2)
         self.assertAlmostEqual(invented.std(), real.std(), delta=2)
-        told, _, grey, labels = embedded("--smooth", 1000, "--no-contrast")
+        told, _, grey, labels = embedded("--smooth", 1000, "--margin", 5, "--no-contrast")
         self.assertGreater(grey[labels == 3].std(), 1.5 * real.std())
 
     def test_it_says_when_there_is_too_little_speckle(self):
