@@ -18,7 +18,7 @@ Lines with the same values of "by" make one row. In it the keys of the first of 
 character that is no letter or digit: echorama.seconds. "lines" holds them all, in order. "only: EXPRESSION" leaves lines out. There may
 be several "row"s, each with what was said before it. "plot: PICTURE" also draws the lines (plot_benchmark.py) into a file beside the page.
 Where no row tells of memory ("_mb", "bytes") and the lines have a "peak_mb", that of a row's first line is put into a last column of the
-table, which its head gets with it. The number at the end is that of the kernels' contents and their own headers',
+table, which its head gets with it; not with "peak: none", where other processes are measured. The number at the end is that of the kernels' contents and their own headers',
 without comments, spaces and the paths of what they include: when it is not theirs any more, a test fails.
 
 What a program printed on a quiet machine is kept beside it, and used again as long as the program and our libraries are the same: a
@@ -48,7 +48,7 @@ class Table:
         self.page, self.names = page, match["names"].split()
         self.stamp = (match["stamp"] or "").strip()
         self.begin, self.end, self.head = match.start("head"), match.end(), match["head"]
-        self.kernels, self.rows, self.plot = [], [], None
+        self.kernels, self.rows, self.plot, self.peak = [], [], None, True
         by, only = ["case"], "True"
         for line in match["spec"].splitlines():
             key, _, value = line.partition(": ")
@@ -62,8 +62,10 @@ class Table:
                 self.rows.append((by, only, value.strip()))
             elif key == "plot":
                 self.plot = page.parent / value
+            elif (key, value) == ("peak", "none"):
+                self.peak = False
             else:
-                sys.exit(f"{self}: \"{line}\" is none of kernels, by, only, row, plot")
+                sys.exit(f"{self}: \"{line}\" is none of kernels, by, only, row, plot, peak")
         if not self.kernels or not self.rows:
             sys.exit(f"{self}: it names no kernels, or no row")
 
@@ -84,7 +86,7 @@ class Table:
     def filled(self, lines, how):
         """The head, the rows, the line that says how they were measured, and the end."""
         text = ""
-        with_peak = not any("_mb" in row or "bytes" in row for _, _, row in self.rows) and any("peak_mb" in line for line in lines)
+        with_peak = self.peak and not any("_mb" in row or "bytes" in row for _, _, row in self.rows) and any("peak_mb" in line for line in lines)
         lines = [line for line in lines if "case" in line]  # others are points of curves
         for by, only, row in self.rows:
             groups = {}
