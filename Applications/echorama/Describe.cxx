@@ -17,7 +17,7 @@ bool All(const CLI::App*)
 
 bool IsListed(const CLI::Option* option)
 {
-  return !option->get_group().empty() && option->get_name() != "--help" && !option->check_lname("help");
+  return !option->get_group().empty() && !option->check_lname("help");
 }
 
 bool IsFlag(const CLI::Option* option)
