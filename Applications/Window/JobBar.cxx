@@ -38,7 +38,10 @@ void JobBar::Watch(Job* job)
   layout->addWidget(stop);
   this->layout()->addWidget(row);
   row->hide(); // what is done before anybody could read of it does not make the window jump
-  QTimer::singleShot(ShowMs, row, &QWidget::show);
+  auto* later = new QTimer(row);
+  later->setSingleShot(true);
+  connect(later, &QTimer::timeout, row, &QWidget::show);
+  later->start(ShowMs);
   jobs_.append(job);
   emit CountChanged(++count_);
 
@@ -48,7 +51,9 @@ void JobBar::Watch(Job* job)
     stop->setEnabled(false);
     label->setText(tr("Stopping: %1").arg(job->Label()));
   });
-  connect(job, &QObject::destroyed, this, [this, row] {
+  connect(job, &QObject::destroyed, this, [this, row, later] {
+    later->stop();
+    row->hide(); // at once: it goes when Qt gets to it, and whoever drags then would see everything jump
     row->deleteLater();
     jobs_.removeAll(nullptr);
     emit CountChanged(--count_);

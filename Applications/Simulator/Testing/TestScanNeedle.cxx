@@ -240,9 +240,18 @@ void TestScanNeedle::aMouseBringsTurnsAndAdvancesIt()
     return window.Window().Body()->ToCanvas(at.data()).toPoint();
   };
   const Vector3d entry = needle.Entry(), direction = needle.Now().direction;
-  window.Drag(canvas, shaft(), shaft() + QPoint(20, 0));
+  const QPoint taken = shaft();
+  window.Drag(canvas, taken, taken + QPoint(20, 0));
   window.Frame();
-  QVERIFY((needle.Entry() - entry).norm() > 1.0);
+  QVERIFY2((needle.Entry() - entry).norm() > 1.0,
+           qPrintable(QString("the needle came %1 mm far; it was taken at %2, %3 of a view of %4 x %5, and lies at %6, %7 now")
+                          .arg((needle.Entry() - entry).norm())
+                          .arg(taken.x())
+                          .arg(taken.y())
+                          .arg(canvas->width())
+                          .arg(canvas->height())
+                          .arg(shaft().x())
+                          .arg(shaft().y())));
   QVERIFY(Angle(needle.Now().direction, direction) < 1e-6);
   window.Drag(canvas, shaft(), shaft() + QPoint(20, 0), Qt::LeftButton, Qt::ShiftModifier);
   window.Frame();

@@ -9,6 +9,7 @@
 #include "MessageBar.h"
 #include "WindowUnderTest.h"
 #include "Workbench.h"
+#include <algorithm>
 #include <QAction>
 #include <QApplication>
 #include <QClipboard>
@@ -197,7 +198,15 @@ void TestMessages::progressIsWhereErrorsAre()
   window.Key(Qt::Key_R);
   QTRY_VERIFY(window.Part<QWidget>("jobCancel")->isVisible() || window.Window().Jobs()->Count() == 0);
   window.Screenshot("progress");
+  const auto isShown = [jobs] {
+    const auto buttons = jobs->findChildren<QWidget*>("jobCancel");
+    return std::any_of(buttons.begin(), buttons.end(), [](const QWidget* each) { return each->isVisible(); });
+  };
+  bool isLeft = false; // of a job that has ended
+  const QObject untilHere;
+  connect(jobs, &JobBar::CountChanged, &untilHere, [&](int count) { isLeft |= count == 0 && isShown(); });
   QVERIFY(window.Wait());
+  QVERIFY(!isLeft && !isShown());
   QVERIFY(window.HasMessage("Refine: done"));
   QVERIFY(jobs->geometry().bottom() <= bar->geometry().top() && jobs->x() == bar->x());
 }
