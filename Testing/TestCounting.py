@@ -117,6 +117,43 @@ class Counting(unittest.TestCase):
         self.add_python(text, name="Python.Other")
         self.expect((2, 0, 0))
 
+    # ---------------------------------------------------------------------------------------------------- what is tried again
+
+    def add_unsteady(self, name, later, label="window"):
+        """A test that fails at first, and does what the shell command says later."""
+        report, mark = self.tree / "Testing" / "reports" / f"{name}.xml", self.tree / f"{name}.ran"
+        told = "<TestCase><TestFunction name='initTestCase'><Incident type='pass'/></TestFunction><TestFunction name='a'>" \
+               "<Incident type='{}'/></TestFunction></TestCase>"
+        self.add(name, self.program(f"program of {name}", f"""\
+            #!/bin/sh
+            if [ -e '{mark}' ]; then {later.format(f'echo "{told.format("pass")}" >"{report}"')}; fi
+            touch '{mark}'
+            echo "{told.format("fail")}" >'{report}'
+            exit 1
+            """), LABELS=f"{label};reports")
+
+    def test_a_window_that_fails_is_tried_again_by_itself(self):
+        self.add("Plain", "/bin/true")
+        self.add_unsteady("Window.Late", "{}; exit 0")
+        self.expect((2, 0, 0), "once more, by themselves: Window.Late", "passed by themselves only: Window.Late")
+
+    def test_what_fails_twice_has_failed(self):
+        self.add_unsteady("Window.Late", "{}; exit 0")
+        self.add_unsteady("Window.Wrong", "false")
+        self.add_unsteady("Window.Dies", "exit 3")  # without a report: that of the first try does not count
+        self.expect((1, 2, 0), "Window.Wrong.a", "Window.Dies: it left no report")
+        self.assertNotIn("only: Window.Wrong", self.said)
+
+    def test_nothing_else_is_tried_again(self):
+        self.add_unsteady("Python.Late", "{}; exit 0", label="python")
+        self.expect((0, 1, 0))
+        self.assertNotIn("once more", self.said)
+
+    def test_many_windows_that_fail_are_not_tried_again(self):
+        for i in range(6):
+            self.add_unsteady(f"Window.Late{i}", "{}; exit 0")
+        self.expect((0, 6, 0))
+
     # ------------------------------------------------------------------------------------------------- what does not run
 
     def test_a_missing_executable_fails(self):
