@@ -79,6 +79,8 @@ function(echorama_precompile target kind)
     elseif(kind STREQUAL "kernels")
       set_target_properties(${maker} PROPERTIES CXX_VISIBILITY_PRESET default VISIBILITY_INLINES_HIDDEN OFF)
     endif()
+    # clang writes when each header was changed, which is another time in each clone: a compiler cache would never find anything.
+    target_compile_options(${maker} PRIVATE "$<$<CXX_COMPILER_ID:Clang>:SHELL:-Xclang -fno-pch-timestamp>")
     target_precompile_headers(${maker} PRIVATE ${ECHORAMA_HEADERS_${kind}})
   endif()
   target_precompile_headers(${target} REUSE_FROM ${maker})
