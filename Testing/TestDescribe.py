@@ -14,9 +14,108 @@ from program_under_test import PROGRAM, SOURCE, blobs, run, write_mha
 DESKTOP = SOURCE / "Applications" / "desktop"
 COMMANDS = re.findall(r"^  ([a-z][a-z-]*) ", run("--help").stdout, re.MULTILINE)
 LEAVES = [[name] for name in COMMANDS if name != "calibrate"] + [["calibrate", kind] for kind in ("hand-eye", "pivot", "rig", "surface", "temporal")]
-# Elements of Slicer's Execution Model, and what may be in a parameter.
-TYPES = {"integer", "double", "boolean", "string", "double-vector", "string-enumeration", "file", "directory", "image"}
-PARTS = {"name", "label", "description", "longflag", "index", "default", "element", "constraints", "channel"}
+# The rules of Slicer's Execution Model that forms must keep: those of its parser (ModuleDescriptionParser of 3D Slicer) and of the stricter
+# schema of CTK, which reads the same forms (ctkCmdLineModule.xsd). Debian has neither.
+IDENTIFIER = r"[_a-zA-Z][_a-zA-Z0-9]*"
+OF_THE_WHOLE = ["category", "title", "description", "version", "documentation-url", "license", "contributor", "acknowledgements", "parameters"]
+OF_A_PARAMETER = ["name", "flag", "longflag", "index", "description", "label", "default", "channel", "element", "constraints"]
+NUMBERS = {"integer": int, "float": float, "double": float}
+VECTORS = {f"{kind}-vector": kind for kind in NUMBERS}
+ENUMERATIONS = {f"{kind}-enumeration" for kind in (*NUMBERS, "string")}
+FILES = {"file", "image", "geometry"}
+ATTRIBUTES = {**dict.fromkeys([*NUMBERS, "string", "directory"], {"hidden", "multiple"}),
+              **dict.fromkeys([*VECTORS, "string-vector", *ENUMERATIONS, "boolean"], {"hidden"}),
+              "file": {"hidden", "multiple", "fileExtensions"}, **dict.fromkeys(("image", "geometry"), {"hidden", "multiple", "fileExtensions", "type"})}
+
+
+def faults(text):
+    """What the execution model would not take in a form, or would take for something else."""
+    found = []
+    if not text.startswith("<?xml "):
+        found.append("the first line is not that of XML")
+    tree = ElementTree.fromstring(text)
+    if tree.tag != "executable":
+        found.append(f"the outermost is <{tree.tag}>")
+
+    def order(element, wanted, required, may_repeat=()):
+        tags = [part.tag for part in element]
+        known = [tag for tag in tags if tag in wanted]
+        place = f"<{element.tag}> {element.findtext('name') or ''}"
+        if strange := set(tags) - set(wanted):
+            found.append(f"{place}: there is no {strange} in it")
+        if known != sorted(known, key=wanted.index):
+            found.append(f"{place}: order {known}")
+        found.extend(f"{place}: no {tag}" for tag in required if not element.findtext(tag, "").strip())
+        found.extend(f"{place}: {tag} twice" for tag in set(tags) - set(may_repeat) if tags.count(tag) > 1)
+
+    order(tree, OF_THE_WHOLE, ["title", "description"], {"parameters"})
+    groups = tree.findall("parameters")
+    everything = []
+    if not groups:
+        found.append("it has no parameters")
+    for group in groups:
+        if [part.tag for part in group][:2] != ["label", "description"] or len(group) < 3:
+            found.append("a group without label, description or parameters")
+        if set(group.attrib) - {"advanced"}:
+            found.append(f"attributes of a group: {group.attrib}")
+        everything += list(group)[2:]
+    for one in everything:
+        name, kind = one.findtext("name", ""), one.tag
+        place = f"<{kind}> {name}"
+        if kind not in ATTRIBUTES:
+            found.append(f"{place}: there is no such type")
+            continue
+        order(one, OF_A_PARAMETER, ["name", "description", "label"], {"element"})
+        if strange := set(one.attrib) - ATTRIBUTES[kind]:
+            found.append(f"{place}: there is no attribute {strange}")
+        found.extend(f"{place}: {key} is {one.get(key)}" for key in ("hidden", "multiple") if one.get(key, "true") not in ("true", "false"))
+        if not re.fullmatch(IDENTIFIER, name):
+            found.append(f"{place}: its name is no identifier")
+        for tag, pattern in (("flag", "-?[a-zA-Z]"), ("longflag", f"-?-?{IDENTIFIER}"), ("index", r"\d+"), ("channel", "input|output")):
+            if one.find(tag) is not None and not re.fullmatch(pattern, one.findtext(tag) or ""):
+                found.append(f"{place}: {tag} is {one.findtext(tag)}")
+        if (one.find("index") is None) == (one.find("flag") is None and one.find("longflag") is None):
+            found.append(f"{place}: a flag or an index, not both")
+        if kind in FILES and one.find("channel") is None:
+            found.append(f"{place}: no channel")
+        if (kind in ENUMERATIONS) != (one.find("element") is not None):
+            found.append(f"{place}: elements are of enumerations")
+        default, elements = one.findtext("default"), [each.text for each in one.findall("element")]
+        if kind in ENUMERATIONS and default is not None and default not in elements:
+            found.append(f"{place}: the default {default} is none of {elements}")
+        if kind == "boolean" and default not in (None, "true", "false"):
+            found.append(f"{place}: the default is {default}")
+        of_numbers = VECTORS.get(kind, kind)
+        values = []
+        if of_numbers in NUMBERS and default is not None:
+            try:
+                values = [NUMBERS[of_numbers](word) for word in (default.split(",") if kind in VECTORS else [default])]
+            except ValueError:
+                found.append(f"{place}: the default is {default}")
+        limits = one.find("constraints")
+        if limits is not None:
+            if of_numbers not in NUMBERS or [part.tag for part in limits] != ["minimum", "maximum", "step"]:
+                found.append(f"{place}: constraints are minimum, maximum and step of numbers")
+                continue
+            try:
+                least, most, step = (NUMBERS[of_numbers](part.text) for part in limits)
+            except ValueError:
+                found.append(f"{place}: a constraint is no {of_numbers}")
+                continue
+            if not (least < most and 0 < step <= most - least and all(least <= value <= most for value in values)):
+                found.append(f"{place}: {values} is not in [{least}, {most}], or steps of {step} are none in it")
+            if any(abs(value / step - round(value / step)) > 1e-5 for value in values):
+                found.append(f"{place}: {values} is lost in steps of {step}")
+    for tag in ("name", "flag", "longflag", "index"):
+        words = [word for word in (one.findtext(tag) for one in everything) if word]
+        found.extend(f"{tag} {word} is there twice" for word in set(words) if words.count(word) > 1)
+    indices = [int(one.findtext("index")) for one in everything if one.find("index") is not None]
+    if indices != list(range(len(indices))):
+        found.append(f"indices {indices}")
+    several = [i for i, one in enumerate(one for one in everything if one.find("index") is not None) if one.get("multiple") == "true"]
+    if several not in ([], [len(indices) - 1]):
+        found.append("several words before others without a flag")
+    return found
 
 
 def form(*command):
@@ -32,30 +131,41 @@ def parameters(tree):
 class Slicer(unittest.TestCase):
     def test_every_command_has_a_form(self):
         for command in LEAVES:
-            tree = form(*command)
-            self.assertEqual([part.tag for part in tree if part.tag != "parameters"],
-                             ["category", "title", "description", "version", "license", "contributor"])
-            found = parameters(tree)
-            names = [parameter.findtext("name") for parameter in found]
-            self.assertEqual(len(names), len(set(names)), command)
+            done = run(*command, "--xml")
+            self.assertEqual((done.returncode, done.stderr, faults(done.stdout)), (0, "", []), command)
+            found = parameters(ElementTree.fromstring(done.stdout))
             listed = set(re.findall(r"^\s+(?:-\w,)?--([a-z-]+)", run(*command, "--help").stdout, re.MULTILINE)) - {"help", "json", "threads"}
-            self.assertEqual({flag for flag in (parameter.findtext("longflag") for parameter in found) if flag}, {"--" + flag for flag in listed})
-            indices = [int(parameter.findtext("index")) for parameter in found if parameter.find("index") is not None]
-            self.assertEqual(indices, list(range(len(indices))), command)
+            self.assertEqual({flag for flag in (parameter.findtext("longflag") for parameter in found) if flag},
+                             {"--" + flag.replace("-", "_") for flag in listed})
             for parameter in found:
-                self.assertIn(parameter.tag, TYPES, command)
-                self.assertLessEqual({part.tag for part in parameter}, PARTS)
-                self.assertRegex(parameter.findtext("name"), r"^[a-z][a-z_]*$")
-                self.assertTrue(parameter.findtext("description"))
                 default = parameter.findtext("default")
-                if parameter.tag in ("integer", "double"):
-                    float(default)  # a field that is empty would be zero
-                if parameter.tag == "string-enumeration":
-                    self.assertIn(default, [element.text for element in parameter.findall("element")], command)
+                if parameter.tag in ("integer", "double", "string-enumeration"):
+                    self.assertIsNotNone(default, (command, parameter.findtext("name")))  # a field that is empty would be zero, or the first
                 if parameter.tag in ("file", "directory", "image"):
-                    written = parameter.findtext("longflag") in ("--output", "--save-poses", "--record", "--screenshot", "--apply") or (
+                    written = parameter.findtext("longflag") in ("--output", "--save_poses", "--record", "--screenshot", "--apply") or (
                         command, parameter.findtext("name")) == (["convert"], "output")
                     self.assertEqual(parameter.findtext("channel"), "output" if written else "input", (command, parameter.findtext("name")))
+
+    def test_what_the_model_does_not_take_is_found(self):
+        good = run("stitch", "--xml").stdout
+        for old, new, told in (("<longflag>--detail_sharpness", "<longflag>--detail-sharpness", "longflag is --detail-sharpness"),
+                               ("<index>0", "<longflag>--x</longflag><index>0", "not both"), ("<label>Sharpness</label>", "", "no label"),
+                               ("double", "number", "no such type"), ("<channel>input", "<channel>both", "channel is both"),
+                               ("<name>sharpness", "<name>1st", "no identifier"), ("<name>sharpness", "<name>method", "there twice"),
+                               ("<step>", "<step>1 ", "is no double"), ("<minimum>0<", "<minimum>1e6<", "steps of"), ("<default>32", "<default>32.12345", "is lost in steps"), ("<default>32", "<default>1001", "is not in"),
+                               ("<default>membrane", "<default>nothing", "is none of"), ("<title>", "<category>x</category><title>", "category twice"),
+                               ("<description>", "<version>1</version><description>", "order"), ('multiple="true"', 'many="true"', "no attribute"),
+                               ("<executable>", "<executable><colour/>", "there is no {'colour'}"), ("<index>0", "<index>1", "indices")):
+            bad = good.replace(old, new) if old == "double" else good.replace(old, new, 1)
+            self.assertIn(told, "\n".join(faults(bad)), old)
+
+    def test_underscores_in_names_of_options(self):
+        with tempfile.TemporaryDirectory() as folder:
+            written = [pathlib.Path(folder) / name for name in ("hyphens_.mha", "underscores_.mha")]  # only names of options are changed
+            for path, words in zip(written, (["--depth-max=30", "--fan-width", "20"], ["--depth_max=30", "--fan_width", "20"])):
+                done = run("noise", "--spacing", "2", *words, f"--output={path}")
+                self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual(written[0].read_bytes(), written[1].read_bytes())
 
     def test_what_goes_in_and_comes_out_is_a_volume(self):
         kinds = {parameter.findtext("name"): parameter for parameter in parameters(form("stitch"))}

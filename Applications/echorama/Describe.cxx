@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Describe.h"
+#include "Core/Base/NumberText.h"
 #include "ParameterOptions.h"
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <set>
 #include <sstream>
@@ -134,34 +137,49 @@ std::string SlicerType(const CLI::Option* option)
   return type == "INT" || type == "UINT" ? "integer" : type == "FLOAT" ? "double" : "string";
 }
 
+// What an arrow of a field adds: 1 to integers, else the power of ten of which the range holds some hundred, or a smaller one
+// that the default is made of: fields may round to it.
+double Step(const std::string& type, const ParameterRange& range, double given)
+{
+  if (type == "integer")
+    return 1.0;
+  double step = std::pow(10.0, std::floor(std::log10(range.high - range.low)) - 2.0);
+  while (step > 1e-9 && std::abs(given / step - std::round(given / step)) > 1e-6)
+    step /= 10.0;
+  return step;
+}
+
 std::string SlicerParameter(const CLI::Option* option, int& index)
 {
   const std::string name = LongName(option), type = SlicerType(option);
   const bool isFile = type == "image" || type == "file" || type == "directory";
-  std::string identifier = name;
+  std::string identifier = name; // flags, too, have underscores there (main.cxx takes both): Slicer refuses hyphens
   Replace(identifier, "-", "_");
   std::string text = "    <" + type + (isFile && type != "directory" && IsMultiple(option) ? " multiple=\"true\"" : "") + ">\n" +
-                     Element("name", identifier) + Element("label", Label(name));
+                     Element("name", identifier);
   if (option->get_positional())
     text += Element("index", std::to_string(index++));
   else
-    text += Element("longflag", "--" + name);
-  text += Element("description", option->get_description());
-  if (isFile)
-    text += Element("channel", Written.count(name) ? "output" : "input");
+    text += Element("longflag", "--" + identifier);
+  text += Element("description", option->get_description()) + Element("label", Label(name));
   std::string given = type == "boolean" ? "false" : option->get_default_str();
   if (type == "double-vector")
     for (char& letter : given)
       letter = letter == ' ' ? ',' : letter;
   if (!given.empty() && !isFile)
     text += Element("default", given);
-  for (const std::string& choice : ChoicesOf(option))
+  if (isFile)
+    text += Element("channel", Written.count(name) ? "output" : "input");
+  for (const std::string& choice : type == "string-enumeration" ? ChoicesOf(option) : std::vector<std::string>())
     text += Element("element", choice);
   const ParameterRange range = RangeOf(option);
   if ((type == "double" || type == "integer") && range.low > -Unlimited && range.high < 1e15) {
-    std::ostringstream limits;
-    limits << "<minimum>" << range.low << "</minimum><maximum>" << range.high << "</maximum>";
-    text += "      <constraints>" + limits.str() + "</constraints>\n";
+    const auto limit = [&type](double number) { // integers are of 32 bits there
+      return type == "integer" ? std::to_string(static_cast<int>(std::clamp(number, -2147483648.0, 2147483647.0)))
+                               : NumberText(number);
+    };
+    text += "      <constraints><minimum>" + limit(range.low) + "</minimum><maximum>" + limit(range.high) + "</maximum><step>" +
+            NumberText(Step(type, range, std::stod(given))) + "</step></constraints>\n";
   }
   return text + "    </" + type + ">\n";
 }

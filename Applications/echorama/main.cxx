@@ -4,6 +4,7 @@
 #include "Commands.h"
 #include "Core/Base/Parallel.h"
 #include "Describe.h"
+#include <algorithm>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <CLI/Validators.hpp>
@@ -106,6 +107,14 @@ bool Describe(CLI::App& program, Common& common, const std::vector<std::string>&
   return true;
 }
 
+// 3D Slicer knows no hyphens in names of options: --save_poses is --save-poses.
+void TakeUnderscores(int argc, char** argv)
+{
+  for (int i = 1; i < argc && std::strcmp(argv[i], "--") != 0; ++i)
+    if (std::strncmp(argv[i], "--", 2) == 0)
+      std::replace(argv[i], argv[i] + std::strcspn(argv[i], "="), '_', '-');
+}
+
 int Run(const std::string& command, const Action& action, bool json, int threads)
 {
   Session session(command, json);
@@ -127,6 +136,7 @@ int Run(const std::string& command, const Action& action, bool json, int threads
 
 int main(int argc, char** argv)
 {
+  TakeUnderscores(argc, argv);
   CLI::App program("Reconstruct, align, stitch, embed and look at 3D ultrasound volumes.", "echorama");
   program.set_version_flag("--version", "echorama " ECHORAMA_VERSION);
   program.require_subcommand(1);
