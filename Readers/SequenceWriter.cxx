@@ -173,7 +173,8 @@ void SequenceWriter::Finish(const Progress& progress)
     p.header.seekp(at);
     p.header << text;
   };
-  fill(p.frameCountAt, std::to_string(p.frames));
+  const std::string count = std::to_string(p.frames); // Teem and what is made of it read no blanks after the sizes
+  fill(p.frameCountAt, p.meta ? count : std::string(FrameDigits - count.size(), ' ') + count);
   if (p.compressedSizeAt > 0)
     fill(p.compressedSizeAt, std::to_string(compressed));
   p.header.seekp(end);

@@ -13,7 +13,7 @@ import zlib
 
 import numpy
 
-from program_under_test import PLUS, SOURCE, blobs, read_mha, read_sequence, run, run_json, turned, write_mha, write_plus, write_sequence
+from program_under_test import PLUS, SOURCE, blobs, read_mha, read_sequence, run, run_json, turned, write_mha, write_plus, write_poses, write_sequence
 
 work = None  # a folder for all tests
 
@@ -193,6 +193,24 @@ class Transforms(unittest.TestCase):
         again = run_json("info", work / "set.json")["files"][0]
         self.assertEqual(again["transforms"], told["transforms"])
         self.assertEqual(json.loads((work / "set.json").read_text())["schema"], "echorama-transforms-1")
+
+    def test_poses_become_transforms_of_itk(self):
+        pose = numpy.eye(4)
+        pose[:3, :3], pose[:3, 3] = turned(30, 1), (1, -2, 3.5)
+        write_poses(work / "poses.json", ["first.mha", "second.mha"], [numpy.eye(4), pose])
+        told = run_json("convert", work / "poses.json", work / "to.tfm")
+        self.assertEqual(told["files"], [str(work / "to.first.tfm"), str(work / "to.second.tfm")])
+        numbers = [float(word) for word in (work / "to.second.tfm").read_text().splitlines()[3].split()[1:]]
+        back = numpy.linalg.inv(pose)  # ITK's lead from the result to what is moved
+        numpy.testing.assert_allclose(numbers, [*back[:3, :3].ravel(), *back[:3, 3]], atol=1e-14)
+        write_poses(work / "one.json", ["second.mha"], [pose])
+        self.assertEqual(run_json("convert", work / "one.json", work / "one.tfm")["files"], [str(work / "one.tfm")])
+        self.assertEqual((work / "one.tfm").read_text(), (work / "to.second.tfm").read_text())
+        write_poses(work / "same.json", ["a/x.mha", "b/x.mha"], [pose, pose])
+        done = run("convert", work / "same.json", work / "same.tfm")
+        self.assertEqual((done.returncode, list(work.glob("same*.tfm"))), (1, []), done.stderr)
+        self.assertIn("two volumes", done.stderr)
+        self.assertEqual(run("convert", work / "poses.json", work / "other.json").returncode, 2)
 
     def test_open_cycles_are_told(self):
         path = work / "open.xml"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama convert: from one file format to another. Volumes go through VTK's reader and writer; sequences go frame by frame from
-// kernel to kernel, so that they need no memory; transforms become our JSON.
+// kernel to kernel, so that they need no memory; transforms become our JSON, poses transforms of ITK.
 #include "Commands.h"
 #include "Core/Geometry/TransformFile.h"
 #include "FrameList.h"
@@ -95,6 +95,34 @@ void ConvertTransforms(Session& session, const ConvertOptions& options)
   session.Say("wrote " + options.output + ": " + std::to_string(transforms.size()) + " transforms");
 }
 
+// One file per volume: of "to.tfm" and the volume "a.mha" it is "to.a.tfm"; of a single volume "to.tfm".
+void ConvertPoses(Session& session, const ConvertOptions& options)
+{
+  namespace fs = std::filesystem;
+  const fs::path output(options.output);
+  if (output.extension() != ".tfm")
+    Misused(options.output + ": poses become .tfm, a transform of ITK for each volume");
+  const std::vector<VolumePose> poses = ReadPoses(options.input);
+  std::vector<std::string> names;
+  for (const VolumePose& pose : poses) {
+    fs::path name = output;
+    if (poses.size() > 1)
+      name.replace_extension(fs::path(pose.file).stem().string() + ".tfm");
+    CheckOutput(name.string(), {options.input});
+    if (std::find(names.begin(), names.end(), name.string()) != names.end())
+      throw Error(Error::Kind::NotPossible, name.string() + ": two volumes of " + options.input + " have this name");
+    if (!pose.displacement.empty())
+      session.Note(name.string() + ": how " + pose.file + " is bent is not in it");
+    names.push_back(name.string());
+  }
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    WriteItkTransform(names[i], poses[i].volumeToWorld);
+  session.result["files"] = names;
+  session.result["lost"] = nlohmann::ordered_json::array();
+  for (const std::string& name : names)
+    session.Say("wrote " + name);
+}
+
 void Convert(Session& session, const ConvertOptions& options)
 {
   session.result["input"] = options.input;
@@ -113,7 +141,7 @@ void Convert(Session& session, const ConvertOptions& options)
   case FileKind::Transforms:
     return ConvertTransforms(session, options);
   case FileKind::Poses:
-    throw Error(Error::Kind::BadInput, options.input + ": poses have one format only");
+    return ConvertPoses(session, options);
   }
 }
 
@@ -122,7 +150,8 @@ void Convert(Session& session, const ConvertOptions& options)
 void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<ConvertOptions>();
-  options->add_option("input", values->input, "Volume of any format (a file, or a folder of slices), sequence or transforms")
+  options
+      ->add_option("input", values->input, "Volume of any format (a file, or a folder of slices), sequence, transforms or poses")
       ->type_name("FILE")
       ->required();
   options->add_option("output", values->output, "File to write; its extension names the format")->type_name("FILE")->required();

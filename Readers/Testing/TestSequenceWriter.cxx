@@ -134,6 +134,16 @@ TEST_F(SequenceWriterTest, TheHeaderIsWhatPlusExpects)
             "Seq_Frame0000_ImageStatus = OK\nElementDataFile = LOCAL\nab");
 }
 
+TEST_F(SequenceWriterTest, NothingFollowsTheSizesOfNrrd) // Teem, and so ITK and 3D Slicer, would count one more
+{
+  SequenceContent content;
+  content.dimensions = {2, 1, 1};
+  Write(Path("a.seq.nrrd"), content, false, std::vector<SequenceFrame>(12), std::vector<std::string>(12, "ab"));
+  std::stringstream text;
+  text << std::ifstream(Path("a.seq.nrrd"), std::ios::binary).rdbuf();
+  EXPECT_NE(text.str().find("\nsizes: 2 1 1         12\n"), std::string::npos) << text.str();
+}
+
 TEST_F(SequenceWriterTest, PosesAloneAndManyFrames)
 {
   SequenceContent content;
