@@ -203,6 +203,25 @@ class Study(unittest.TestCase):
             answer = peer.align(same, start, 120)
             self.assertLess(np.linalg.norm(apply(answer.motion, points) - points, axis=1).mean(), 0.6, name)  # a fifth of a voxel
 
+    def test_programs_of_the_user(self):
+        """A program finds both volumes, the second where the start puts it; its answer counts from where its file stood. What fails says why."""
+        script = work / "own.py"
+        script.write_text("import json, sys\nfrom echorama import vtkUltrasoundReader\nreader = vtkUltrasoundReader()\nreader.SetFileName(sys.argv[3])\n"
+                          "reader.Update()\nif sys.argv[1] == 'fails': sys.exit('no ' + sys.argv[1])\nif sys.argv[1] == 'nothing': sys.exit()\n"
+                          "moves = [[[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]] for x in (2, 5)]\n"
+                          "json.dump({'schema': 'echorama-poses-1', 'unit': 'mm', 'frame': 'LPS', 'centre': reader.GetOutput().GetCenter(), 'volumes': "
+                          "[{'file': f, 'VolumeToWorld': m} for f, m in zip(sys.argv[2:4], moves)]} if sys.argv[1] == 'moves' else {}, open(sys.argv[4], 'w'))\n")
+        own = contestants.contestants(PROGRAM, programs=[f"{word}=/usr/bin/python3 {script} {word}" for word in ("moves", "fails", "nothing", "nonsense")])
+        start = next(start for start in self.case.starts() if "20deg" in start.name)
+        answer = own["moves"].align(self.case, start, 60)
+        np.testing.assert_allclose(answer.motion, pose(move=(3, 0, 0)) @ start.motion, atol=1e-9)
+        self.assertGreater(answer.seconds, 0)
+        for word, why in (("fails", "no fails"), ("nothing", "wrote no poses"), ("nonsense", "no file of poses")):
+            with self.assertRaisesRegex(contestants.Failed, why):
+                own[word].align(self.case, start, 60)
+        with self.assertRaisesRegex(contestants.Failed, "does not start"):
+            contestants.Program("no-such-program").align(self.case, start, 60)
+
     def test_refusals(self):
         (work / "empty").mkdir(exist_ok=True)
         for arguments, words in ((["run", work / "empty"], "there are no cases in it"), (["plot", work / "empty"], "run comes first"),

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Who aligns: the program echorama with one set of options or another, the search of the dissertation, and elastix where it is installed.
+"""Who aligns: the program echorama with one set of options or another, the search of the dissertation, elastix where it is installed, and
+programs of the user's.
 
 Each gets a case and a start and answers with the second volume's motion as seen from the first, from where their files stand.
 """
@@ -8,6 +9,7 @@ import json
 import pathlib
 import re
 import resource
+import shlex
 import shutil
 import subprocess
 import tempfile
@@ -155,6 +157,29 @@ class Elastix:
                           cpu_seconds() - before)
 
 
+class Program:
+    """Any program, called as COMMAND FIRST.mha SECOND.mha POSES.json: it writes where the two belong, as a pose file. The start is in the
+    geometry of the second volume. The time is that of the whole program."""
+
+    def __init__(self, command):
+        self.command = shlex.split(command)
+
+    def align(self, case, start, limit):
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            write_moved(folder, case, start)
+            begin, before, out = time.monotonic(), cpu_seconds(), folder / "poses.json"
+            done = run_program([*self.command, folder / "0.mha", folder / "1.mha", out], limit)
+            seconds = time.monotonic() - begin
+            if done.returncode != 0 or not out.exists():
+                raise Failed(done.stderr.strip()[-300:] or f"it ended with status {done.returncode}" + ("" if out.exists() else " and wrote no poses"))
+            try:
+                (_, first), (_, second) = read_poses(out)
+            except (ValueError, KeyError, TypeError) as problem:
+                raise Failed(f"its poses: {problem}") from problem
+            return Answer(np.linalg.inv(first) @ second @ start.motion, seconds, cpu_seconds() - before)
+
+
 def euler_motion(text):
     """The motion that a file of elastix's EulerTransform holds."""
     def numbers(key):
@@ -171,8 +196,8 @@ def euler_motion(text):
     return motion
 
 
-def contestants(program, own=()):
-    """By name. `own`: "NAME=OPTIONS of echorama align" of the user."""
+def contestants(program, own=(), programs=()):
+    """By name. Of the user: `own`, "NAME=OPTIONS of echorama align", and `programs`, "NAME=COMMAND"."""
     found = {"echorama": Echorama(program)}
     search = pathlib.Path(shutil.which(program) or program).resolve().parents[1] / "benchmarks" / "BenchmarkAlignSearch"
     if search.exists():
@@ -182,4 +207,7 @@ def contestants(program, own=()):
     for text in own:
         name, _, options = text.partition("=")
         found[name] = Echorama(program, options.split())
+    for text in programs:
+        name, _, command = text.partition("=")
+        found[name] = Program(command)
     return found

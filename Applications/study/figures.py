@@ -295,10 +295,10 @@ def plot(folder, rows, out, show=None):
     if not rows:
         return
     (out / "table.md").write_text(tables(rows))
-    bodies = [row for row in rows if "excess_mm" in row]
+    bodies = [row for row in rows if "scan" in row and "excess_mm" in row]
     if bodies:
         plot_bodies(out / "bodies.png", bodies)
-    if len(bodies) < len(rows):
+    if any("scan" not in row for row in rows):
         plot_results(out / "results.png", [row for row in rows if "scan" not in row])
     pairs = [f"{row['case']}/{row['start']}" for row in rows]
     show = show or next((pair for pair in pairs if pair.startswith("plain/") and "20deg" in pair), pairs[0])

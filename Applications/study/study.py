@@ -153,6 +153,8 @@ def main(arguments=None):
     command.add_argument("--methods", nargs="+", metavar="NAME", help="only these (default: all that are installed)")
     command.add_argument("--method", action="append", default=[], metavar="NAME=OPTIONS",
                          help="one more contestant: echorama align with these options; again for each")
+    command.add_argument("--contestant", action="append", default=[], metavar="NAME=COMMAND",
+                         help="one more: any program, called as COMMAND FIRST.mha SECOND.mha POSES.json; again for each")
     command.add_argument("--starts", nargs="+", metavar="TEXT", help="only starts whose names hold one of these texts (default: all)")
     command.add_argument("--again", action="store_true", help="also what was done before")
     command.add_argument("--limit", type=float, default=300.0, help="seconds for one alignment (default 300)")
@@ -174,11 +176,11 @@ def main(arguments=None):
         elif options.command == "make":
             make(options.folder, options.pairs, options.seed, options.repeats, options.spacing)
         elif options.command == "run":
-            known = contestants(options.program, options.method)
+            known = contestants(options.program, options.method, options.contestant)
             unknown = [name for name in options.methods or [] if name not in known]
             if unknown:
                 raise ValueError(f"there is no method {unknown[0]}; there are {', '.join(known)}")
-            wanted = [*(options.methods or []), *(text.partition("=")[0] for text in options.method)] or list(known)
+            wanted = [*(options.methods or []), *(text.partition("=")[0] for text in options.method + options.contestant)] or list(known)
             rows = run(options.folder, {name: known[name] for name in known if name in wanted}, options.program,
                        options.again, options.limit, options.starts)
             print(f"{len(rows)} results in {options.folder / 'results.csv'}, {time.monotonic() - begin:.0f} s")
