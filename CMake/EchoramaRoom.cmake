@@ -228,7 +228,7 @@ endfunction()
 set(ECHORAMA_TESTS_ON_SCREEN TestCommandLine TestDemo TestDemoSurface TestExamples TestUltrasoundAlignmentWidget TestUltrasoundSliceView
   TestUltrasoundVolumeView BenchmarkVolumeView BenchmarkWorkbench)
 # Left to ./run test --all (and to -R, which runs what it names): a fifth of the time of all tests.
-set(ECHORAMA_SLOW_TESTS TestAlignmentVerdicts TestDemo TestExamples)
+set(ECHORAMA_SLOW_TESTS TestAlignmentVerdicts TestDemo TestExamples TestSite TestTutorials)
 # The others follow by the time that they took before, as ctest remembers it.
 set(ECHORAMA_TESTS_STARTED_FIRST TestCommandLine TestDataContract ${ECHORAMA_SLOW_TESTS})
 
