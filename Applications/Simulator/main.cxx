@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "CommandLine.h"
 #include "SimulatorWindow.h"
 #include "Theme.h"
 #include <cstdio>
@@ -9,6 +10,22 @@
 
 int main(int argc, char** argv)
 {
+  const QCommandLineOption skin("skin",
+                                "A mesh (.stl, .ply, .obj, .vtp) in mm of the volume's world to scan on. Default: the "
+                                "outline of the first volume.",
+                                "FILE");
+  const QCommandLineOption top("top",
+                               "The side that is scanned: x, -x, y, -y, z or -z of the world. Default: from where the volume "
+                               "was scanned, if it says so, else the front of a patient, -y.",
+                               "AXIS");
+  const echorama::CommandLine line{"echorama-simulator",
+                                   "Moves a probe over a body and shows what it would see, live.",
+                                   {skin, top},
+                                   "FILE",
+                                   "What is scanned: volumes (where several are real, the first counts), or a scene (.json); "
+                                   "and states of it under a probe that presses (.vti)."};
+  if (line.PrintManPage(argc, argv))
+    return 0;
   QSurfaceFormat format = QVTKOpenGLNativeWidget::defaultFormat();
   format.setSamples(0); // without a GPU smoothed edges cost more than they are worth
   QSurfaceFormat::setDefaultFormat(format);
@@ -19,23 +36,7 @@ int main(int argc, char** argv)
   QApplication::setApplicationVersion(ECHORAMA_VERSION);
 
   QCommandLineParser options;
-  options.setApplicationDescription("Moves a probe over a body and shows what it would see, live.");
-  options.addHelpOption();
-  options.addVersionOption();
-  const QCommandLineOption skin("skin",
-                                "A mesh (.stl, .ply, .obj, .vtp) in mm of the volume's world to scan on. Default: the "
-                                "outline of the first volume.",
-                                "FILE");
-  options.addOption(skin);
-  const QCommandLineOption top("top",
-                               "The side that is scanned: x, -x, y, -y, z or -z of the world. Default: from where the volume "
-                               "was scanned, if it says so, else the front of a patient, -y.",
-                               "AXIS");
-  options.addOption(top);
-  options.addPositionalArgument("FILE",
-                                "What is scanned: volumes (where several are real, the first counts), or a scene (.json); and "
-                                "states of it under a probe that presses (.vti).",
-                                "[FILE...]");
+  line.AddTo(options);
   options.process(application);
 
   const QString axis = options.value(top);

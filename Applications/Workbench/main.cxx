@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "CommandLine.h"
 #include "MainWindow.h"
 #include "Preferences.h"
 #include "Theme.h"
@@ -11,6 +12,14 @@
 
 int main(int argc, char** argv)
 {
+  const QCommandLineOption project("project", "Open a project.", "FILE");
+  const echorama::CommandLine line{"echorama-workbench",
+                                   "Aligns, paints, stitches and scores overlapping 3D ultrasound volumes by hand.",
+                                   {project},
+                                   "VOLUME",
+                                   "Volumes (or folders of slices, or poses) to open."};
+  if (line.PrintManPage(argc, argv))
+    return 0;
   QSurfaceFormat format = QVTKOpenGLNativeWidget::defaultFormat();
   format.setSamples(0); // slices are pictures; without a GPU smoothed edges cost more than they are worth
   QSurfaceFormat::setDefaultFormat(format);
@@ -20,12 +29,7 @@ int main(int argc, char** argv)
   QApplication::setApplicationVersion(ECHORAMA_VERSION);
 
   QCommandLineParser options;
-  options.setApplicationDescription("Aligns, paints, stitches and scores overlapping 3D ultrasound volumes by hand.");
-  options.addHelpOption();
-  options.addVersionOption();
-  const QCommandLineOption project("project", "Open a project.", "FILE");
-  options.addOption(project);
-  options.addPositionalArgument("VOLUME", "Volumes (or folders of slices, or poses) to open.", "[VOLUME...]");
+  line.AddTo(options);
   options.process(application);
 
   const echorama::Preferences preferences = echorama::Preferences::Kept();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Describe.h"
 #include "Core/Base/NumberText.h"
+#include "ManPage.h"
 #include "ParameterOptions.h"
 #include <algorithm>
 #include <cmath>
@@ -184,35 +185,26 @@ std::string SlicerParameter(const CLI::Option* option, int& index)
   return text + "    </" + type + ">\n";
 }
 
-std::string Troff(std::string text)
+std::vector<ManEntry> OptionEntries(const CLI::App& app)
 {
-  Replace(text, "\\", "\\e");
-  Replace(text, "-", "\\-");
-  if (!text.empty() && (text[0] == '.' || text[0] == '\''))
-    text.insert(0, "\\&");
-  Replace(text, "\n", "\n.br\n");
-  return text;
-}
-
-std::string TroffOptions(const CLI::App& app)
-{
-  std::string text;
+  std::vector<ManEntry> entries;
   for (const CLI::Option* option : app.get_options(IsListed)) {
-    std::string names;
+    ManEntry entry;
     for (const std::string& name : option->get_snames())
-      names += "-" + name + ", ";
-    names += option->get_lnames().empty() ? option->get_name(true) : "--" + option->get_lnames().front();
+      entry.name += "-" + name + ", ";
+    entry.name += option->get_lnames().empty() ? option->get_name(true) : "--" + option->get_lnames().front();
     const std::vector<std::string> choices = ChoicesOf(option);
-    std::string value = IsFlag(option) || option->get_positional() ? "" : TypeOf(option), help = option->get_description();
+    entry.value = IsFlag(option) || option->get_positional() ? "" : TypeOf(option);
+    entry.help = option->get_description();
     if (!choices.empty() && !ParameterOf(option)) // whose help names them
       for (const std::string& choice : choices)
-        help += (&choice == &choices.front() ? " (" : ", ") + choice + (&choice == &choices.back() ? ")" : "");
+        entry.help += (&choice == &choices.front() ? " (" : ", ") + choice + (&choice == &choices.back() ? ")" : "");
     if (!option->get_default_str().empty())
-      help += " [" + option->get_default_str() + "]";
-    text += ".TP\n\\fB" + Troff(names) + "\\fR" + (value.empty() ? "" : " \\fI" + Troff(value) + "\\fR") +
-            (IsMultiple(option) ? " ..." : "") + "\n" + Troff(help) + "\n";
+      entry.help += " [" + option->get_default_str() + "]";
+    entry.several = IsMultiple(option);
+    entries.push_back(std::move(entry));
   }
-  return text;
+  return entries;
 }
 
 std::string Joined(const std::vector<std::string>& words)
@@ -271,25 +263,16 @@ std::string SlicerDescription(const CLI::App& command, const std::string& name)
   return text + group("Input and output", files) + group("Parameters", others) + "</executable>\n";
 }
 
-std::string ManPage(const CLI::App& app, const std::string& name, const std::string& ending)
+std::string ManPageOf(const CLI::App& app, const std::string& command, const std::string& ending)
 {
-  std::string whole = name.empty() ? "echorama" : "echorama " + name, title = whole;
-  Replace(title, " ", "-");
-  std::string text = ".TH " + Troff(title) + " 1 \"\" \"echorama " ECHORAMA_VERSION "\" \"Echorama\"\n.SH NAME\n" + Troff(title) +
-                     " \\- " + Troff(app.get_description()) + "\n.SH SYNOPSIS\n\\fB" + Troff(whole) + "\\fR";
-  for (const CLI::Option* option : app.get_options(IsListed))
-    if (option->get_positional())
-      text += " \\fI" + Troff(option->get_name(true)) + "\\fR" + (IsMultiple(option) ? " ..." : "");
-  text += app.get_subcommands(All).empty() ? " [\\fIoptions\\fR]\n" : " \\fIcommand\\fR ...\n";
-  if (!app.get_subcommands(All).empty()) {
-    text += ".SH COMMANDS\n";
-    for (const CLI::App* each : app.get_subcommands(All))
-      text += ".TP\n\\fB" + Troff(each->get_name()) + "\\fR\n" + Troff(each->get_description()) + "\n" +
-              (name.empty() ? "" : ".RS\n" + TroffOptions(*each) + ".RE\n");
-  }
-  if (!name.empty())
-    text += ".SH OPTIONS\n" + TroffOptions(app);
-  return text + ".SH EXIT STATUS\n" + Troff(ending) + "\n" + (name.empty() ? "" : ".SH SEE ALSO\n.BR echorama (1)\n");
+  ManPage page{command, app.get_description(), {}, {}, ending};
+  const bool isWhole = !app.get_parent() && !app.get_subcommands(All).empty(); // its commands have pages of their own
+  for (const CLI::App* each : app.get_subcommands(All))
+    page.commands.push_back(
+        {each->get_name(), "", each->get_description(), false, isWhole ? std::vector<ManEntry>() : OptionEntries(*each)});
+  if (!isWhole)
+    page.options = OptionEntries(app);
+  return page.Text();
 }
 
 std::string BashCompletion(const CLI::App& program)

@@ -11,8 +11,9 @@ namespace echorama {
 /// whole command: "calibrate rig".
 std::string SlicerDescription(const CLI::App& command, const std::string& name);
 
-/// The manual page, in troff, of the program (\a name empty: with its commands) or of one of its commands (with its options).
-std::string ManPage(const CLI::App& app, const std::string& name, const std::string& ending);
+/// The manual page, in troff, of a program or of one of its commands: \a command is "echorama", with its commands, or "echorama
+/// align", with its options. \a ending is what the exit status tells.
+std::string ManPageOf(const CLI::App& app, const std::string& command, const std::string& ending);
 
 /// A script for bash that completes commands, options, and what options may be.
 std::string BashCompletion(const CLI::App& program);

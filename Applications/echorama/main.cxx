@@ -92,7 +92,7 @@ bool Describe(CLI::App& program, Common& common, const std::vector<std::string>&
   }
   const auto all = [](const CLI::App*) { return true; };
   if (what == "--man") {
-    std::cout << ManPage(*app, name, ExitStatus);
+    std::cout << ManPageOf(*app, name.empty() ? "echorama" : "echorama " + name, ExitStatus);
   } else if (what == "--xml") {
     if (!app->get_subcommands(all).empty())
       Misused("--xml: of a single command, as echorama align --xml");

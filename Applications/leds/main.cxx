@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama-leds: switches the lights of the optical tracker; see Documentation/optical-hardware.md.
+#include "Applications/echorama/Describe.h"
 #include "Applications/echorama/ParameterOptions.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/FormatText.h"
@@ -128,9 +129,10 @@ int main(int argc, char** argv)
 {
   CLI::App program("Switch the lights of the optical tracker, each by its own code, on GPIO lines.", "echorama-leds");
   program.set_version_flag("--version", "echorama-leds " ECHORAMA_VERSION ", " + GpioLibrary());
-  program.footer(
+  const std::string ending =
       "Ctrl-C ends it, with all lights off.\n"
-      "Exit status: 0 done, 1 it could not be done, 2 wrong usage, 3 done, but more than 1% of all changes were late.");
+      "Exit status: 0 done, 1 it could not be done, 2 wrong usage, 3 done, but more than 1% of all changes were late.";
+  program.footer(ending);
   Options options;
   program
       .add_option("-l,--line", options.place.lines,
@@ -148,6 +150,10 @@ int main(int argc, char** argv)
       program.add_flag("--dry-run", options.dryRun,
                        "Touch no line: print when each changes; with --seconds, also try how punctual this machine is");
   program.add_flag("--csv", options.csv, "Print it as a table for programs")->needs(dryRun);
+  if (argc == 2 && std::string(argv[1]) == "--man") {
+    std::cout << ManPageOf(program, "echorama-leds", ending);
+    return ExitDone;
+  }
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
