@@ -6,14 +6,14 @@
 // adds to what is known. The same goes for pairs that failed from a bad start, and for those that nobody had thought to
 // overlap. That round is cheap, because the start is then as good as a tracker's.
 //
-// Cost: pairs times AlignPair. Which pairs may overlap costs a millisecond each, at the coarsest resolution.
+// Cost: pairs times AlignPair. Which pairs overlap costs next to nothing (OverlappingPairs).
 #include "AlignVolumes.h"
 #include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/JoinedSets.h"
 #include "Index.h"
+#include "OverlappingPairs.h"
 #include "PoseGraph.h"
-#include "VolumeOverlap.h"
-#include "VolumeShape.h"
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -80,7 +80,6 @@ private:
   Numbers Ordered(int a, int b) const { return IsHeld(b) || (!IsHeld(a) && b < a) ? Numbers(b, a) : Numbers(a, b); }
 
   void BuildFeatures(const Progress& progress);
-  double Overlap(int a, int b, const std::vector<Pose>& poses, const Eigen::Vector3d& shift) const;
   std::vector<Numbers> PairsAt(const std::vector<Pose>& poses, double reachMm) const;
   std::vector<Numbers> PairsWithLandmarks() const;
   void Try(const Numbers& pair, AlignStart start, const std::vector<Pose>& poses, const Progress& progress);
@@ -102,7 +101,7 @@ private:
   std::vector<Features> features_;
   std::vector<std::string> troubles_; // why a volume cannot be aligned
   std::vector<bool> held_;
-  std::vector<VolumeShape> shapes_;
+  std::vector<VolumeOutline> outlines_;
   std::map<Numbers, Attempt> attempts_;
   std::vector<Numbers> edges_; // of the graph, as last solved
   PoseGraphResult graph_;
@@ -129,18 +128,8 @@ void Alignment::BuildFeatures(const Progress& progress)
   if (good < 2)
     throw *trouble;
   for (int v = 0; v < Count(); ++v)
-    shapes_.emplace_back(volumes_[Index(v)]);
+    outlines_.emplace_back(volumes_[Index(v)]);
   featureSeconds_ = SecondsSince(start);
-}
-
-// The share of the smaller volume that both hold, the second one being shifted.
-double Alignment::Overlap(int a, int b, const std::vector<Pose>& poses, const Eigen::Vector3d& shift) const
-{
-  PlacedVolume first = volumes_[Index(a)], second = volumes_[Index(b)];
-  first.volumeToWorld = poses[Index(a)];
-  second.volumeToWorld = Eigen::Translation3d(shift) * poses[Index(b)];
-  constexpr int points = 1000;
-  return std::max(OverlapOf({first}, second, points), OverlapOf({second}, first, points));
 }
 
 // For each volume those it overlaps most; where these are few, those too that it would overlap if it were closer.
@@ -148,25 +137,10 @@ std::vector<Numbers> Alignment::PairsAt(const std::vector<Pose>& poses, double r
 {
   using Ranked = std::pair<double, Numbers>; // minus the overlap
   std::vector<std::vector<Ranked>> near(volumes_.size()), far(volumes_.size());
-  for (int a = 0; a < Count(); ++a)
-    for (int b = a + 1; b < Count(); ++b) {
-      if (!IsPair(a, b))
-        continue;
-      const Eigen::Vector3d way = poses[Index(a)] * shapes_[Index(a)].centroid - poses[Index(b)] * shapes_[Index(b)].centroid;
-      const double distance = way.norm();
-      if (distance - reachMm > shapes_[Index(a)].reach + shapes_[Index(b)].reach)
-        continue; // their spheres do not meet
-      double overlap = Overlap(a, b, poses, Eigen::Vector3d::Zero());
-      auto* list = &near;
-      if (overlap < p_.pair.minimumOverlap && reachMm > 0.0 && distance > 0.0) {
-        overlap = Overlap(a, b, poses, way * std::min(1.0, reachMm / distance));
-        list = &far;
-      }
-      if (overlap < p_.pair.minimumOverlap)
-        continue;
-      (*list)[Index(a)].push_back({-overlap, Ordered(a, b)});
-      (*list)[Index(b)].push_back({-overlap, Ordered(a, b)});
-    }
+  for (const OverlappingPair& pair :
+       OverlappingPairs(outlines_, poses, reachMm, p_.pair.minimumOverlap, [this](int a, int b) { return IsPair(a, b); }))
+    for (const int v : {pair.a, pair.b})
+      (pair.isFar ? far : near)[Index(v)].push_back({-pair.overlap, Ordered(pair.a, pair.b)});
   std::vector<Numbers> pairs;
   for (std::size_t v = 0; v < volumes_.size(); ++v) {
     std::sort(near[v].begin(), near[v].end());
@@ -188,9 +162,11 @@ std::vector<Numbers> Alignment::PairsWithLandmarks() const
 {
   std::vector<Numbers> pairs;
   for (int a = 0; a < Count(); ++a)
-    for (int b = a + 1; b < Count(); ++b)
-      if (IsPair(a, b) && !PairLandmarks(volumes_[Index(a)].landmarks, {}, volumes_[Index(b)].landmarks, {}).empty())
+    for (int b = a + 1; b < Count() && !volumes_[Index(a)].landmarks.empty(); ++b)
+      if (IsPair(a, b) && !volumes_[Index(b)].landmarks.empty() &&
+          !PairLandmarks(volumes_[Index(a)].landmarks, {}, volumes_[Index(b)].landmarks, {}).empty())
         pairs.push_back(Ordered(a, b));
+  std::sort(pairs.begin(), pairs.end());
   return pairs;
 }
 
@@ -266,8 +242,8 @@ void Alignment::Solve(const Progress& progress)
     graph.outlierMm = std::min(1000.0, p_.outlierVoxels * voxelMm);
   }
   double radius = 0.0;
-  for (const VolumeShape& shape : shapes_)
-    radius += shape.radius / Count();
+  for (const VolumeOutline& outline : outlines_)
+    radius += outline.shape.radius / Count();
   graph.radiusMm = std::clamp(radius, 1.0, 10000.0);
   graph_ = SolvePoseGraph(start, edges, fixed_, graph, progress);
   for (std::size_t e = 0; e < edges.size(); ++e) {
@@ -309,8 +285,8 @@ void Alignment::FindTheLost(const Progress& progress)
     std::vector<std::pair<double, int>> others; // by distance
     for (int other = 0; other < Count(); ++other)
       if (graph_.isPlaced[Index(other)] && CanBeAligned(other))
-        others.push_back({(graph_.volumeToWorld[Index(other)] * shapes_[Index(other)].centroid -
-                           graph_.volumeToWorld[Index(v)] * shapes_[Index(v)].centroid)
+        others.push_back({(graph_.volumeToWorld[Index(other)] * outlines_[Index(other)].shape.centroid -
+                           graph_.volumeToWorld[Index(v)] * outlines_[Index(v)].shape.centroid)
                               .norm(),
                           other});
     std::sort(others.begin(), others.end());
@@ -421,11 +397,12 @@ AlignVolumesResult Alignment::Report() const
     pair.votedDown = attempt.votedDown;
     pair.contested = attempt.contested;
     pair.residualMm = attempt.residualMm;
-    const auto edge = std::find(edges_.begin(), edges_.end(), numbers);
-    if (edge == edges_.end() && attempt.votedDown)
+    const auto edge = std::lower_bound(edges_.begin(), edges_.end(), numbers); // they are in the attempts' order
+    const bool isEdge = edge != edges_.end() && *edge == numbers;
+    if (!isEdge && attempt.votedDown)
       pair.reason = "it disagreed with the other pairs by " + Millimetres(pair.residualMm) +
                     "; aligned again from where they place it: " + own.reason;
-    if (edge != edges_.end()) {
+    if (isEdge) {
       const std::size_t e = Index(static_cast<int>(edge - edges_.begin()));
       pair.stands = !graph_.isWrong[e];
       if (!attempt.votedDown)
@@ -467,15 +444,16 @@ AlignVolumesResult Alignment::Report() const
 // Which volumes pairs that were clear by themselves join to those that stay.
 std::vector<bool> Alignment::JoinedByClearPairs() const
 {
-  std::vector<bool> joined = held_;
-  for (bool grows = true; grows;) {
-    grows = false;
-    for (std::size_t e = 0; e < edges_.size(); ++e) {
-      const auto a = Index(edges_[e].first), b = Index(edges_[e].second);
-      if (joined[a] != joined[b] && !graph_.isWrong[e] && attempts_.at(edges_[e]).edge.verified)
-        joined[a] = joined[b] = grows = true;
-    }
-  }
+  JoinedSets<int> sets(volumes_.size());
+  for (int v = 0; v < Count(); ++v)
+    if (IsHeld(v))
+      sets.Join(fixed_, v);
+  for (std::size_t e = 0; e < edges_.size(); ++e)
+    if (!graph_.isWrong[e] && attempts_.at(edges_[e]).edge.verified)
+      sets.Join(edges_[e].first, edges_[e].second);
+  std::vector<bool> joined(volumes_.size());
+  for (int v = 0; v < Count(); ++v)
+    joined[Index(v)] = sets.Of(v) == sets.Of(fixed_);
   return joined;
 }
 
@@ -487,7 +465,12 @@ std::vector<bool> Alignment::JoinedByClearPairs() const
 void Alignment::StateErrors(AlignVolumesResult& result) const
 {
   const std::vector<bool> isClear = JoinedByClearPairs();
-  const auto middle = [&](int v) { return result.volumes[Index(v)].volumeToWorld * shapes_[Index(v)].centroid; };
+  std::vector<double> voxelsMm(volumes_.size(), 0.0);
+  for (const auto& [numbers, attempt] : attempts_)
+    for (const int v : {numbers.first, numbers.second})
+      if (attempt.stands)
+        voxelsMm[Index(v)] = std::max(voxelsMm[Index(v)], attempt.pair.alignment.voxelMm);
+  const auto middle = [&](int v) { return result.volumes[Index(v)].volumeToWorld * outlines_[Index(v)].shape.centroid; };
   for (int v = 0; v < Count(); ++v) {
     VolumeAlignment& volume = result.volumes[Index(v)];
     volume.name = volumes_[Index(v)].name;
@@ -498,13 +481,9 @@ void Alignment::StateErrors(AlignVolumesResult& result) const
     if (IsHeld(v) || volume.verdict == Verdict::Failed)
       continue;
     const double bentMm = p_.pair.soundSpeedError * (middle(v) - middle(fixed_)).norm();
-    const double openMm = shapes_[Index(v)].Error(volume.covariance, volume.centre, volume.volumeToWorld);
+    const double openMm = outlines_[Index(v)].shape.Error(volume.covariance, volume.centre, volume.volumeToWorld);
     volume.errorMm = std::hypot(openMm, bentMm);
-    double voxelMm = 0.0;
-    for (const auto& [numbers, attempt] : attempts_)
-      if (attempt.stands && (numbers.first == v || numbers.second == v))
-        voxelMm = std::max(voxelMm, attempt.pair.alignment.voxelMm);
-    if (volume.verdict == Verdict::Aligned && !isClear[Index(v)] && openMm > p_.pair.maximumErrorVoxels * voxelMm) {
+    if (volume.verdict == Verdict::Aligned && !isClear[Index(v)] && openMm > p_.pair.maximumErrorVoxels * voxelsMm[Index(v)]) {
       volume.verdict = Verdict::Ambiguous;
       volume.reason =
           "the image contents do not determine its pose: by all pairs together it may be off by " + Millimetres(openMm);
@@ -528,7 +507,7 @@ AlignVolumesResult Alignment::Run(const Progress& progress)
   double reachMm = 0.0;
   for (int v = 0; v < Count(); ++v) {
     start.push_back(volumes_[Index(v)].volumeToWorld);
-    reachMm = std::max(reachMm, 2.0 / 3.0 * shapes_[Index(v)].reach);
+    reachMm = std::max(reachMm, 2.0 / 3.0 * outlines_[Index(v)].shape.reach);
   }
   if (Count() == 2) {
     TryAll({Ordered(0, 1)}, p_.pair.start, start, progress.Part(0.1, 1.0));
@@ -558,7 +537,7 @@ AlignVolumesResult Alignment::Run(const Progress& progress)
   }
   const std::vector<Numbers> sure = PairsWithLandmarks();
   pairs.erase(std::remove_if(pairs.begin(), pairs.end(),
-                             [&sure](const Numbers& pair) { return std::find(sure.begin(), sure.end(), pair) != sure.end(); }),
+                             [&sure](const Numbers& pair) { return std::binary_search(sure.begin(), sure.end(), pair); }),
               pairs.end());
   TryAll(sure, p_.pair.start, start, progress.Part(0.1, sure.empty() ? 0.1 : 0.4));
   TryAll(pairs, near, start, progress.Part(sure.empty() ? 0.1 : 0.4, 0.7));

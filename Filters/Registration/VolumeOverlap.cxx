@@ -30,34 +30,46 @@ bool Holds(VolumeView<const float> voxels, const Map& m, const Eigen::Vector3f& 
 
 } // namespace
 
-double OverlapOf(const std::vector<PlacedVolume>& fixed, const PlacedVolume& moving, int points, std::uint64_t seed)
+OverlapPoints::OverlapPoints(const PlacedVolume& volume, int count, std::uint64_t seed)
 {
-  const PyramidLevel& coarsest = moving.pyramid->back();
+  const PyramidLevel& coarsest = volume.pyramid->back();
   const VolumeView<const float> own = coarsest.intensity.View();
   const Sampler<float> sampler(own, {});
   const Eigen::Affine3d toWorld = coarsest.geometry.IndexToWorld(), toIndex = coarsest.geometry.WorldToIndex();
-  std::ptrdiff_t real = 0, all = 0, covered = 0;
-  const Eigen::Vector3d centre = toWorld * ValidCentroid<float>(own, {}, real);
-  Pose fromCentre = moving.volumeToWorld;
-  fromCentre.translation() = moving.volumeToWorld * centre;
-  std::vector<Map> maps;
-  for (const PlacedVolume& volume : fixed)
-    maps.push_back(MapOf(Eigen::Affine3d(volume.pyramid->back().geometry.Moved(volume.volumeToWorld).WorldToIndex().matrix() *
-                                         fromCentre.matrix())));
-  for (const Eigen::Vector3d& index : ValidPoints<float>(own, {}, points, seed)) {
+  std::ptrdiff_t real = 0;
+  centre = toWorld * ValidCentroid<float>(own, {}, real);
+  for (const Eigen::Vector3d& index : ValidPoints<float>(own, {}, count, seed)) {
     const Eigen::Vector3d p = toWorld * index, at = toIndex * p;
     double value = 0.0;
-    if (!sampler.Linear(at.x(), at.y(), at.z(), value))
-      continue;
-    ++all;
-    const Eigen::Vector3f fromIt = (p - centre).cast<float>();
+    if (sampler.Linear(at.x(), at.y(), at.z(), value))
+      fromCentre.push_back((p - centre).cast<float>());
+  }
+}
+
+double OverlapOf(const OverlapPoints& points, const Pose& volumeToWorld, const std::vector<PlacedLevel>& fixed)
+{
+  Pose fromCentre = volumeToWorld;
+  fromCentre.translation() = volumeToWorld * points.centre;
+  std::vector<Map> maps;
+  for (const PlacedLevel& placed : fixed)
+    maps.push_back(
+        MapOf(Eigen::Affine3d(placed.level->geometry.Moved(placed.volumeToWorld).WorldToIndex().matrix() * fromCentre.matrix())));
+  std::ptrdiff_t covered = 0;
+  for (const Eigen::Vector3f& p : points.fromCentre)
     for (std::size_t f = 0; f < fixed.size(); ++f)
-      if (Holds(fixed[f].pyramid->back().intensity.View(), maps[f], fromIt)) {
+      if (Holds(fixed[f].level->intensity.View(), maps[f], p)) {
         ++covered;
         break;
       }
-  }
-  return static_cast<double>(covered) / static_cast<double>(all);
+  return points.fromCentre.empty() ? 0.0 : static_cast<double>(covered) / static_cast<double>(points.fromCentre.size());
+}
+
+double OverlapOf(const std::vector<PlacedVolume>& fixed, const PlacedVolume& moving, int points, std::uint64_t seed)
+{
+  std::vector<PlacedLevel> levels;
+  for (const PlacedVolume& volume : fixed)
+    levels.push_back({&volume.pyramid->back(), volume.volumeToWorld});
+  return OverlapOf(OverlapPoints(moving, points, seed), moving.volumeToWorld, levels);
 }
 
 } // namespace echorama
