@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "AlignPair.h"
+#include "PreparedVolumes.h"
 #include <functional>
 
 namespace echorama {
@@ -19,6 +20,7 @@ struct AlignVolumesParameters {
   double floorVoxels = 0.3;
   double outlierVoxels = 2.0, outlierSigmas = 6.0;
   std::uint64_t seed = 1; ///< of the pose graph's trees
+  AlignResources resources;
 };
 
 ParameterList Describe(AlignVolumesParameters& p);
@@ -60,6 +62,9 @@ struct AlignVolumesResult {
   std::vector<PairOfVolumes> pairs; ///< those that were tried, by their numbers
   double consistency = 0.0; ///< how far pairs disagree, in what they claim to be sure of: 1 as claimed; 0: nothing to compare
   double featureSeconds = 0.0, pairSeconds = 0.0, graphSeconds = 0.0;
+  int timesPrepared = 0;       ///< how often all that pairs ask of a volume was made: more than once where memory did not last
+  double preparedBytes = 0.0;  ///< the most of it that was kept at once
+  int pairsFinishedBefore = 0; ///< pairs that were not aligned but known from the file
 };
 
 /// Aligns any number of volumes: every pair that may overlap by itself, then all pairs together as a pose graph.
@@ -75,5 +80,27 @@ struct AlignVolumesResult {
 AlignVolumesResult AlignVolumes(const std::vector<PlacedVolume>& volumes, int fixed,
                                 const AlignVolumesParameters& parameters = {}, const Progress& progress = {},
                                 const PairAligner& aligner = AlignPair);
+
+/// The same for volumes that are more than memory holds: resolutions are made when pairs ask for them and kept within the
+/// budget, and pairs are aligned in an order in which few are made twice. The same result, to the last bit.
+AlignVolumesResult AlignVolumesOnDemand(const std::vector<VolumeOnDemand>& volumes, int fixed,
+                                        const AlignVolumesParameters& parameters = {}, const Progress& progress = {},
+                                        const PairAligner& aligner = AlignPair);
+
+/// What an alignment would do.
+struct AlignVolumesPlan {
+  std::vector<std::pair<int, int>> pairs;        ///< that are tried first
+  int pairsFinishedBefore = 0;                   ///< those of them that are in the file
+  int timesPrepared = 0;                         ///< how often volumes would be made for the others
+  double bytesPerVolume = 0.0, bytesOfAll = 0.0; ///< of what is made
+  double budgetBytes = 0.0;
+  double secondsPerPair = 0.0, secondsPerVolume = 0.0; ///< of a few that were tried
+  double seconds = 0.0; ///< of all of them; pairs that are tried again, and the pose graph, come on top
+};
+
+/// Aligns only a few of the pairs, to see how long they take. \throws as AlignVolumes
+AlignVolumesPlan PlanAlignment(const std::vector<VolumeOnDemand>& volumes, int fixed,
+                               const AlignVolumesParameters& parameters = {}, const Progress& progress = {},
+                               const PairAligner& aligner = AlignPair);
 
 } // namespace echorama

@@ -53,7 +53,31 @@ Json ToJson(const AlignVolumesResult& result, int first)
     pairs.push_back(ToJson(pair, first));
   return {{"volumes", volumes},
           {"pairs", pairs},
-          {"seconds", {{"prepare", result.featureSeconds}, {"pairs", result.pairSeconds}, {"graph", result.graphSeconds}}}};
+          {"seconds", {{"prepare", result.featureSeconds}, {"pairs", result.pairSeconds}, {"graph", result.graphSeconds}}},
+          {"pairs_finished_before", result.pairsFinishedBefore},
+          {"times_prepared", result.timesPrepared},
+          {"prepared_bytes", result.preparedBytes}};
+}
+
+Json ToJson(const AlignVolumesPlan& plan, int first)
+{
+  Json pairs = Json::array();
+  for (const auto& [fixed, moving] : plan.pairs)
+    pairs.push_back({first + fixed, first + moving});
+  return {{"pairs", pairs},
+          {"pairs_finished_before", plan.pairsFinishedBefore},
+          {"times_prepared", plan.timesPrepared},
+          {"bytes_per_volume", plan.bytesPerVolume},
+          {"bytes_of_all", plan.bytesOfAll},
+          {"budget_bytes", plan.budgetBytes},
+          {"seconds_per_pair", plan.secondsPerPair},
+          {"seconds_per_volume", plan.secondsPerVolume},
+          {"seconds", plan.seconds}};
+}
+
+std::string Report(const AlignVolumesPlan& plan)
+{
+  return ToJson(plan, 0).dump();
 }
 
 std::string Report(const AlignVolumesResult& result)

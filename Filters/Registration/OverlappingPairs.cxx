@@ -88,4 +88,27 @@ std::vector<OverlappingPair> OverlappingPairs(const std::vector<VolumeOutline>& 
   return pairs;
 }
 
+std::vector<std::pair<int, int>> MostOverlapping(const std::vector<OverlappingPair>& all, int volumes, int most, int enough)
+{
+  using Ranked = std::pair<double, std::pair<int, int>>; // minus the overlap
+  std::vector<std::vector<Ranked>> near(Index(volumes)), far(Index(volumes));
+  for (const OverlappingPair& pair : all)
+    for (const int v : {pair.a, pair.b})
+      (pair.isFar ? far : near)[Index(v)].push_back({-pair.overlap, {pair.a, pair.b}});
+  std::vector<std::pair<int, int>> pairs;
+  for (std::size_t v = 0; v < near.size(); ++v) {
+    std::sort(near[v].begin(), near[v].end());
+    std::sort(far[v].begin(), far[v].end());
+    near[v].resize(std::min(near[v].size(), Index(most)));
+    for (const Ranked& ranked : far[v])
+      if (near[v].size() < Index(std::min(enough, most)))
+        near[v].push_back(ranked);
+    for (const Ranked& ranked : near[v])
+      pairs.push_back(ranked.second);
+  }
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  return pairs;
+}
+
 } // namespace echorama

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Random.h"
+#include "Core/Base/TextFile.h"
 #include "Filters/Registration/AlignVolumes.h"
+#include "Filters/Registration/Metric.h"
+#include "Testing/TemporaryFolder.h"
 #include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
@@ -442,6 +445,251 @@ TEST(AlignVolumes, ProgressAndStopping)
   } catch (const Error& error) {
     EXPECT_EQ(error.GetKind(), Error::Kind::Cancelled);
   }
+}
+
+// Volumes that are made when they are asked for; what pairs find tells what they were given.
+class OnDemand {
+public:
+  explicit OnDemand(Ring& ring) : ring_(ring)
+  {
+    for (const PlacedVolume& volume : ring.Volumes()) {
+      PlacedVolume placed = volume;
+      placed.pyramid = nullptr;
+      const auto number = volumes.size();
+      volumes.push_back(
+          {placed,
+           [this, number](bool withReliability, const Progress&) {
+             made += withReliability;
+             PreparedVolume prepared;
+             for (const PyramidLevel& level : ring_.pyramids[number]) {
+               prepared.pyramid.push_back({Volume<float>(level.geometry.dimensions), level.geometry, level.realVoxels});
+               std::copy(level.intensity.View().begin(), level.intensity.View().end(),
+                         prepared.pyramid.back().intensity.View().begin());
+             }
+             return prepared;
+           },
+           "content " + std::to_string(number)});
+    }
+  }
+
+  PairAligner Aligner()
+  {
+    return [this, inner = ring_.Aligner()](const PlacedVolume& fixed, const std::shared_ptr<const MetricPyramid>& fixedFeatures,
+                                           const PlacedVolume& moving, const std::shared_ptr<const MetricPyramid>& movingFeatures,
+                                           const AlignPairParameters& p, const Progress& progress) {
+      if (static_cast<int>(ring_.calls.size()) >= stopAfter)
+        throw Error(Error::Kind::Cancelled, "stopped");
+      PairAlignment found = inner(fixed, fixedFeatures, moving, movingFeatures, p, progress);
+      const auto seen = [](const PlacedVolume& volume, const MetricPyramid& features) {
+        double sum = 0.0;
+        for (const float voxel : volume.pyramid->front().intensity.View())
+          sum += static_cast<double>(voxel);
+        return sum + static_cast<double>(features.levels.front().seen[100].value);
+      };
+      found.score = seen(fixed, *fixedFeatures) + 0.5 * seen(moving, *movingFeatures);
+      return found;
+    };
+  }
+
+  std::vector<VolumeOnDemand> volumes;
+  int made = 0, stopAfter = 1000000;
+
+private:
+  Ring& ring_;
+};
+
+// To the last bit.
+void ExpectSame(const AlignVolumesResult& a, const AlignVolumesResult& b)
+{
+  ASSERT_EQ(a.pairs.size(), b.pairs.size());
+  for (std::size_t i = 0; i < a.pairs.size(); ++i) {
+    EXPECT_EQ(a.pairs[i].fixed, b.pairs[i].fixed);
+    EXPECT_EQ(a.pairs[i].moving, b.pairs[i].moving);
+    EXPECT_EQ(a.pairs[i].verdict, b.pairs[i].verdict);
+    EXPECT_EQ(a.pairs[i].reason, b.pairs[i].reason);
+    EXPECT_EQ(a.pairs[i].attempts, b.pairs[i].attempts);
+    EXPECT_EQ(a.pairs[i].alignment.score, b.pairs[i].alignment.score);
+    EXPECT_EQ(a.pairs[i].alignment.volumeToWorld.matrix(), b.pairs[i].alignment.volumeToWorld.matrix());
+    EXPECT_EQ(a.pairs[i].alignment.information, b.pairs[i].alignment.information);
+  }
+  ASSERT_EQ(a.volumes.size(), b.volumes.size());
+  for (std::size_t v = 0; v < a.volumes.size(); ++v) {
+    EXPECT_EQ(a.volumes[v].volumeToWorld.matrix(), b.volumes[v].volumeToWorld.matrix());
+    EXPECT_EQ(a.volumes[v].covariance, b.volumes[v].covariance);
+    EXPECT_EQ(a.volumes[v].verdict, b.volumes[v].verdict);
+    EXPECT_EQ(a.volumes[v].reason, b.volumes[v].reason);
+  }
+}
+
+TEST(AlignVolumes, LittleMemoryFindsTheSame)
+{
+  Ring ring;
+  ring.Lie(2, 4, 1);
+  OnDemand plenty(ring), little(ring);
+  AlignVolumesParameters p = Tracked();
+  p.resources.memoryGb = 1.0;
+  const AlignVolumesResult all = AlignVolumesOnDemand(plenty.volumes, 0, p, {}, plenty.Aligner());
+  EXPECT_EQ(all.timesPrepared, 10);
+  EXPECT_EQ(plenty.made, 10);
+  // Of caller's resolutions only the features are ours.
+  const AlignVolumesResult kept = AlignVolumes(ring.Volumes(), 0, p, {}, plenty.Aligner());
+  ExpectSame(all, kept);
+  EXPECT_LT(kept.preparedBytes, 0.7 * all.preparedBytes);
+
+  const double four = 0.41 * all.preparedBytes;
+  p.resources.memoryGb = four * 1e-9;
+  const AlignVolumesResult some = AlignVolumesOnDemand(little.volumes, 0, p, {}, little.Aligner());
+  ExpectSame(all, some);
+  EXPECT_LE(some.preparedBytes, four);
+  EXPECT_GT(some.preparedBytes, 0.75 * four);
+  EXPECT_GT(some.timesPrepared, 10);
+  EXPECT_EQ(little.made, some.timesPrepared);
+  const int pairs = static_cast<int>(ring.calls.size()) / 3;
+  EXPECT_LT(some.timesPrepared, 2 * 2 * pairs / 3) << "volumes shall be kept between pairs";
+
+  p.resources.memoryGb = 1e-9;
+  const AlignVolumesResult least = AlignVolumesOnDemand(little.volumes, 0, p, {}, little.Aligner());
+  ExpectSame(all, least);
+  EXPECT_LT(some.timesPrepared, least.timesPrepared);
+  EXPECT_NEAR(least.preparedBytes, 0.2 * all.preparedBytes, 1.0); // a pair needs two
+}
+
+TEST(AlignVolumes, VolumesOnDemandThatCannotBeAlignedFailForThemselves)
+{
+  Ring ring(5);
+  for (PyramidLevel& level : ring.pyramids[3])
+    for (float& voxel : level.intensity.View())
+      voxel = 7.0f;
+  OnDemand demand(ring);
+  AlignVolumesParameters p = Tracked();
+  for (const double gb : {1.0, 1e-9}) {
+    p.resources.memoryGb = gb;
+    const AlignVolumesResult result = AlignVolumesOnDemand(demand.volumes, 0, p, {}, demand.Aligner());
+    ExpectSame(result, AlignVolumes(ring.Volumes(), 0, p, {}, demand.Aligner()));
+    EXPECT_EQ(result.volumes[3].verdict, Verdict::Failed);
+    EXPECT_NE(result.volumes[3].reason.find("volume 3"), std::string::npos) << result.volumes[3].reason;
+  }
+}
+
+class AlignVolumesFile : public testing::TemporaryFolder {};
+
+TEST_F(AlignVolumesFile, GoesOnWhereItWasStopped)
+{
+  Ring ring;
+  ring.Lie(2, 4, 1); // so that there is a second round
+  OnDemand demand(ring);
+  AlignVolumesParameters p = Tracked();
+  const AlignVolumesResult whole = AlignVolumesOnDemand(demand.volumes, 0, p, {}, demand.Aligner());
+  const std::size_t pairs = ring.calls.size();
+
+  p.resources.finishedPairs = Path("finished.json");
+  ring.calls.clear();
+  demand.stopAfter = 7;
+  EXPECT_THROW(AlignVolumesOnDemand(demand.volumes, 0, p, {}, demand.Aligner()), Error);
+  demand.stopAfter = 1000000;
+  EXPECT_EQ(PlanAlignment(demand.volumes, 0, p, {}, demand.Aligner()).pairsFinishedBefore, 7);
+  ring.calls.clear();
+  AlignVolumesResult result = AlignVolumesOnDemand(demand.volumes, 0, p, {}, demand.Aligner());
+  ExpectSame(whole, result);
+  EXPECT_EQ(result.pairsFinishedBefore, 10); // with the plan's samples
+  EXPECT_EQ(ring.calls.size() + 10, pairs);
+
+  // Nothing has changed: no pair is aligned, and no volume prepared for one.
+  ring.calls.clear();
+  demand.made = 0;
+  result = AlignVolumesOnDemand(demand.volumes, 0, p, {}, demand.Aligner());
+  ExpectSame(whole, result);
+  EXPECT_TRUE(ring.calls.empty());
+  EXPECT_EQ(demand.made, 0);
+
+  // What concerns a volume that is another now, or starts elsewhere, or has landmarks, is aligned again.
+  const auto again = [&] {
+    ring.calls.clear();
+    AlignVolumesOnDemand(demand.volumes, 0, p, {}, demand.Aligner());
+    std::vector<Numbers> first; // round
+    for (const auto& call : ring.calls)
+      first.push_back(call.first);
+    return first;
+  };
+  const auto concernsOnly = [](const std::vector<Numbers>& calls, int v, std::size_t atLeast) {
+    EXPECT_GE(calls.size(), atLeast);
+    for (const Numbers& call : calls)
+      EXPECT_TRUE(call.first == v || call.second == v) << call.first << "-" << call.second;
+  };
+  p.rounds = 1;
+  demand.volumes[5].content = "edited";
+  concernsOnly(again(), 5, 4);
+  demand.volumes[6].placed.volumeToWorld = Eigen::Translation3d(0.0, 0.0, 1e-9) * demand.volumes[6].placed.volumeToWorld;
+  concernsOnly(again(), 6, 4);
+  demand.volumes[8].placed.landmarks.push_back({"apex", Eigen::Vector3d::Zero()});
+  concernsOnly(again(), 8, 4);
+  EXPECT_TRUE(again().empty());
+  p.pair.points = 1234;
+  EXPECT_EQ(again().size(), 20u);
+  demand.volumes[4].content.clear(); // not known: neither found nor kept
+  concernsOnly(again(), 4, 4);
+  concernsOnly(again(), 4, 4);
+  EXPECT_EQ(ReadTextFile(p.resources.finishedPairs).find("nan"), std::string::npos);
+}
+
+TEST_F(AlignVolumesFile, OneThatIsSomethingElseIsLeftAlone)
+{
+  Ring ring(4);
+  OnDemand demand(ring);
+  AlignVolumesParameters p = Tracked();
+  p.resources.finishedPairs = Path("finished.json");
+  AlignVolumesOnDemand(demand.volumes, 0, p, {}, demand.Aligner());
+  const std::string good = ReadTextFile(p.resources.finishedPairs);
+  const auto refuses = [&](const std::string& text) {
+    WriteTextFile(p.resources.finishedPairs, text);
+    try {
+      AlignVolumesOnDemand(demand.volumes, 0, p, {}, demand.Aligner());
+      ADD_FAILURE() << text.substr(0, 80);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.GetKind(), Error::Kind::BadFile) << error.what();
+      EXPECT_EQ(std::string(error.what()).find(p.resources.finishedPairs), 0u) << error.what();
+    }
+    EXPECT_EQ(ReadTextFile(p.resources.finishedPairs), text);
+  };
+  std::string bent = good;
+  const auto digit = bent.find_first_of("123456789", bent.find("\"VolumeToWorld\":[") + 20);
+  bent[digit] = bent[digit] == '1' ? '2' : '1';
+  refuses(bent); // one digit of a pose
+  refuses(good.substr(0, good.size() / 2));
+  refuses("{\"schema\": \"echorama-poses-1\"}");
+  refuses("[]");
+  refuses("poses of mine");
+  std::string old = good;
+  old.replace(old.find("pairs-1"), 7, "pairs-0");
+  refuses(old);
+  WriteTextFile(p.resources.finishedPairs, good);
+  EXPECT_NO_THROW(AlignVolumesOnDemand(demand.volumes, 0, p, {}, demand.Aligner()));
+}
+
+TEST(AlignVolumes, ThePlanIsWhatIsDone)
+{
+  Ring ring;
+  OnDemand demand(ring);
+  AlignVolumesParameters p = Tracked();
+  p.rounds = 1;
+  p.resources.memoryGb = 1.0;
+  const AlignVolumesPlan plan = PlanAlignment(demand.volumes, 0, p, {}, demand.Aligner());
+  EXPECT_LE(ring.calls.size(), 3u);
+  const AlignVolumesResult result = AlignVolumesOnDemand(demand.volumes, 0, p, {}, demand.Aligner());
+  std::vector<Numbers> planned = plan.pairs, done;
+  std::sort(planned.begin(), planned.end());
+  for (const PairOfVolumes& pair : result.pairs)
+    done.push_back({pair.fixed, pair.moving});
+  EXPECT_EQ(planned, done);
+  EXPECT_EQ(plan.timesPrepared, 10);
+  EXPECT_NEAR(plan.bytesOfAll, result.preparedBytes, 1.0);
+  EXPECT_EQ(plan.budgetBytes, 1e9);
+  EXPECT_GT(plan.seconds, 0.0);
+  p.resources.memoryGb = 0.41 * result.preparedBytes * 1e-9;
+  OnDemand little(ring);
+  const AlignVolumesPlan tight = PlanAlignment(little.volumes, 0, p, {}, little.Aligner());
+  EXPECT_GT(tight.timesPrepared, 10);
+  EXPECT_LT(tight.timesPrepared, static_cast<int>(2 * tight.pairs.size()));
 }
 
 TEST(AlignVolumes, RefusesWhatIsWrong)
