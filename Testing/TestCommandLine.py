@@ -221,6 +221,35 @@ class MainJob(unittest.TestCase):
             self.assertFalse(pair["voted_down"])
         self.assertEqual(set(told["align_seconds"]), {"prepare", "pairs", "graph"})
 
+    def test_align_goes_on_and_plans(self):
+        """A dry run writes nothing; what is known of pairs is used again; little memory finds the same poses."""
+        finished, poses = work / "finished.json", [work / f"on_{i}.json" for i in range(4)]
+        common = (*volumes(), "--start", "tracked", "--finished-pairs", finished, *FEWER_POINTS)
+        plan = run_json("align", *common, "-o", poses[0], "--dry-run")["plan"]
+        self.assertFalse(poses[0].exists())
+        self.assertEqual(plan["pairs_finished_before"], 0)
+        self.assertIn([1, 2], plan["pairs"])
+        self.assertGreater(plan["seconds"], 0)
+        self.assertGreater(plan["bytes_of_all"], 2.9 * plan["bytes_per_volume"])
+        self.assertGreater(plan["bytes_per_volume"], 4 * 10**5)
+        first = run_json("align", *common, "-o", poses[1])
+        self.assertGreater(first["pairs_finished_before"], 0)  # those that the plan has tried
+        second = run_json("align", *common, "-o", poses[2], "--memory-gb", 1e-6)
+        self.assertEqual(second["pairs_finished_before"], sum(pair["attempts"] for pair in first["pairs"]))
+        self.assertEqual(second["times_prepared"], 0)
+        finished.unlink()
+        little = run_json("align", *common, "-o", poses[3], "--memory-gb", 1e-6)
+        self.assertLess(little["prepared_bytes"], 2.1 * plan["bytes_per_volume"])
+        self.assertEqual(len({path.read_bytes() for path in poses[1:]}), 1)
+        told = run("align", *common, "--dry-run")
+        self.assertEqual(told.returncode, 0, told.stderr)
+        self.assertIn(f"{len(plan['pairs'])} pairs", told.stdout)
+        finished.write_text('{"schema": "echorama-poses-1"}')
+        refused = run("align", *common, "-o", work / "no.json")
+        self.assertEqual(refused.returncode, 1)
+        self.assertIn("finished.json", refused.stderr)
+        self.assertEqual(finished.read_text(), '{"schema": "echorama-poses-1"}')
+
     def test_align_with_no_options(self):
         """The poses go to poses.json, and what is there already stays."""
         folder = work / "plain"

@@ -62,6 +62,19 @@ void GiveLandmarks(const std::vector<LandmarkList>& lists, const std::vector<Loa
     }
 }
 
+void TellPlan(Session& session, std::size_t volumes, const AlignVolumesPlan& plan)
+{
+  session.result["plan"] = ToJson(plan, 1);
+  const auto gb = [](double bytes) { return Fixed(1e-9 * bytes, 3) + " GB"; };
+  session.Say(std::to_string(volumes) + " volumes, " + std::to_string(plan.pairs.size()) + " pairs, " +
+              std::to_string(plan.pairsFinishedBefore) + " of them finished before");
+  session.Say("memory beside the volumes themselves: " + gb(plan.bytesOfAll) + " for all, " + gb(plan.bytesPerVolume) +
+              " for one; " + gb(plan.budgetBytes) + " may be used, so volumes are prepared " +
+              std::to_string(plan.timesPrepared) + " times");
+  session.Say("time: some " + Fixed(plan.seconds, 0) + " s (" + Fixed(plan.secondsPerPair, 2) + " s for a pair, " +
+              Fixed(plan.secondsPerVolume, 2) + " s to prepare a volume), and more for pairs that are tried again");
+}
+
 void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner, vtkUltrasoundDeformableAligner* deformer)
 {
   options.files = WithoutCompanions(session, options.files);
@@ -74,10 +87,12 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
     inputs.push_back(options.poses);
   if (options.output.empty()) {
     options.output = DefaultOutput;
-    if (std::filesystem::exists(options.output))
+    if (!aligner->GetDryRun() && std::filesystem::exists(options.output))
       throw Error(Error::Kind::FileSystem, options.output + ": it is there already; name it with -o to replace it");
   }
   CheckOutput(options.output, inputs);
+  if (const std::string finished = aligner->GetFinishedPairs(); !finished.empty())
+    CheckOutput(finished, inputs);
   for (std::size_t i = 0; options.deformable && i < options.files.size(); ++i)
     CheckOutput(DisplacementPath(options.output, i), inputs);
   if (options.fixed > static_cast<int>(options.files.size()))
@@ -127,6 +142,10 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
   GiveLandmarks(landmarks, volumes, aligner);
   aligner->SetInputDataObject(BlocksOf(volumes));
   session.Update(aligner, "align");
+  if (aligner->GetDryRun()) {
+    TellPlan(session, volumes.size(), aligner->Plan());
+    return;
+  }
 
   nlohmann::ordered_json report = ToJson(aligner->Result(), 1); // from 1, as --fixed counts
   session.result["output"] = options.output;
@@ -157,6 +176,8 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
   }
   session.result["pairs"] = report["pairs"];
   session.result["align_seconds"] = report["seconds"];
+  for (const char* key : {"pairs_finished_before", "times_prepared", "prepared_bytes"})
+    session.result[key] = report[key];
   session.result["verdict"] = aligner->GetAllAligned() ? "aligned" : "doubtful";
   if (!aligner->GetAllAligned()) {
     session.status = Session::Doubtful;

@@ -2,8 +2,11 @@
 #include "vtkUltrasoundAligner.h"
 
 #include "AlignmentJson.h"
+#include "Core/Base/Checksum.h"
+#include "Core/Base/SizeText.h"
 #include "Core/Geometry/MatrixRows.h"
 #include "PreparedVolume.h"
+#include "vtkFieldData.h"
 #include "vtkImageData.h"
 #include "vtkMatrix4x4.h"
 #include "vtkNew.h"
@@ -12,7 +15,6 @@
 #include "vtkUltrasoundLandmarkField.h"
 
 #include <algorithm>
-#include <chrono>
 
 vtkStandardNewMacro(vtkUltrasoundAligner);
 
@@ -33,6 +35,34 @@ echorama::PreparedVolume Prepare(const vtkUltrasoundVolume::Input& volume, bool 
   });
   return prepared;
 }
+
+// Of all that Prepare depends on.
+std::string ContentOf(const vtkUltrasoundVolume::Input& volume, bool withReliability)
+{
+  std::string content = withReliability ? "reliable " : "";
+  const auto add = [&content](const auto& numbers) {
+    content += echorama::Checksum(numbers.data(), numbers.size() * sizeof(double));
+  };
+  for (vtkDataArray* array : {volume.Intensity, volume.ValidRegion})
+    content += array ? array->GetDataTypeAsString() +
+                           echorama::Checksum(array->GetVoidPointer(0),
+                                              static_cast<std::size_t>(array->GetDataSize() * array->GetDataTypeSize()))
+                     : "-";
+  const echorama::ImageGeometry geometry = vtkUltrasoundVolume::GeometryOf(volume.Image);
+  content += echorama::SizeText(geometry.dimensions);
+  add(geometry.origin);
+  add(geometry.spacing);
+  add(geometry.direction);
+  for (const char* name : {vtkUltrasoundAcquisition::ProbeGeometryName(), vtkUltrasoundAcquisition::ProbeToWorldName()})
+    if (vtkDataArray* array = volume.Image->GetFieldData()->GetArray(name)) {
+      std::vector<double> values;
+      for (vtkIdType i = 0; i < array->GetNumberOfValues(); ++i)
+        values.push_back(
+            array->GetComponent(i / array->GetNumberOfComponents(), static_cast<int>(i % array->GetNumberOfComponents())));
+      add(values);
+    }
+  return content;
+}
 } // namespace
 
 //----------------------------------------------------------------------------
@@ -40,10 +70,14 @@ echorama::ParameterList vtkUltrasoundAligner::Parameters()
 {
   using echorama::Parameter;
   Settings& v = this->Values;
-  return echorama::Join({{Parameter("FixedVolume", v.fixedVolume, {0, echorama::Unlimited}, "",
-                                    "The volume that stays where it is, counted from 0."),
-                          Parameter("UseReliability", v.useReliability, "Whether shadowed and saturated voxels count less.")},
-                         Describe(v.align.pair)});
+  return echorama::Join(
+      {{Parameter("FixedVolume", v.fixedVolume, {0, echorama::Unlimited}, "",
+                  "The volume that stays where it is, counted from 0."),
+        Parameter("UseReliability", v.useReliability, "Whether shadowed and saturated voxels count less.")},
+       Describe(v.align.pair),
+       Describe(v.align.resources),
+       {Parameter("DryRun", v.dryRun, "Whether it is only told what would be done: pairs, memory and time. No volume is moved.")
+            .Advanced()}});
 }
 
 //----------------------------------------------------------------------------
@@ -107,6 +141,7 @@ void vtkUltrasoundAligner::Execute(vtkInformationVector** inputs, vtkInformation
                                    const echorama::Progress& progress)
 {
   this->Found = {};
+  this->Planned = {};
   echorama::CheckRanges(this->Parameters());
   const auto volumes = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
   auto landmarks = this->Landmarks.Lists(static_cast<int>(volumes.size()));
@@ -115,27 +150,32 @@ void vtkUltrasoundAligner::Execute(vtkInformationVector** inputs, vtkInformation
     landmarks[i].insert(landmarks[i].end(), carried.begin(), carried.end());
   }
 
-  // 1. the resolutions of each volume
-  const auto begin = std::chrono::steady_clock::now();
-  std::vector<echorama::PreparedVolume> prepared;
-  std::vector<echorama::PlacedVolume> placed(volumes.size());
+  // 1. what they are; their resolutions are made when a pair asks for them
+  std::vector<echorama::VolumeOnDemand> demanded;
   for (std::size_t i = 0; i < volumes.size(); ++i) {
-    const double count = static_cast<double>(volumes.size());
-    prepared.push_back(Prepare(volumes[i], this->Values.useReliability,
-                               progress.Part(0.1 * static_cast<double>(i) / count, 0.1 * static_cast<double>(i + 1) / count)));
+    echorama::VolumeOnDemand volume;
+    volume.placed.name = volumes[i].Name;
+    volume.placed.landmarks = landmarks[i];
+    volume.prepare = [this, &input = volumes[i]](bool withReliability, const echorama::Progress& part) {
+      return Prepare(input, withReliability && this->Values.useReliability, part);
+    };
+    if (!this->Values.align.resources.finishedPairs.empty())
+      volume.content = ContentOf(volumes[i], this->Values.useReliability);
+    demanded.push_back(std::move(volume));
   }
-  for (std::size_t i = 0; i < volumes.size(); ++i) {
-    placed[i].pyramid = &prepared[i].pyramid;
-    placed[i].reliability = prepared[i].reliability.empty() ? nullptr : &prepared[i].reliability;
-    placed[i].name = volumes[i].Name;
-    placed[i].landmarks = landmarks[i];
-  }
-  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
 
   // 2. where they belong
+  if (this->Values.dryRun) {
+    this->Planned = echorama::PlanAlignment(demanded, this->Values.fixedVolume, this->Values.align, progress);
+    for (std::size_t i = 0; i < volumes.size(); ++i) {
+      vtkNew<vtkImageData> same;
+      same->ShallowCopy(volumes[i].Image);
+      PutBlock(outputs, 0, i, same, volumes[i].Name);
+    }
+    return;
+  }
   echorama::AlignVolumesResult found =
-      echorama::AlignVolumes(placed, this->Values.fixedVolume, this->Values.align, progress.Part(0.1, 1.0));
-  found.featureSeconds += seconds.count();
+      echorama::AlignVolumesOnDemand(demanded, this->Values.fixedVolume, this->Values.align, progress);
 
   // 3. the same voxels there
   for (std::size_t i = 0; i < volumes.size(); ++i) {
@@ -211,6 +251,12 @@ std::string vtkUltrasoundAligner::GetReason(int volume) const
 std::string vtkUltrasoundAligner::GetReport() const
 {
   return this->Found.volumes.empty() ? std::string() : echorama::Report(this->Found);
+}
+
+//----------------------------------------------------------------------------
+std::string vtkUltrasoundAligner::GetPlan() const
+{
+  return this->Planned.budgetBytes > 0.0 ? echorama::Report(this->Planned) : std::string();
 }
 
 //----------------------------------------------------------------------------

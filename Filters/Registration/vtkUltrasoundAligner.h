@@ -10,7 +10,8 @@
  *
  * It needs no start: pairs of volumes are aligned by a global search over rotations and translations, local refinement and a
  * verdict (echorama::AlignPair); a pose graph over all pairs places the volumes and names wrong pairs (echorama::AlignVolumes).
- * A volume whose verdict is `failed` stays where it was.
+ * A volume whose verdict is `failed` stays where it was. What is made of volumes for their pairs is kept as long as MemoryGb
+ * lasts; with FinishedPairs a run that was stopped goes on where it was.
  *
  * Field data of each block:
  *
@@ -128,6 +129,21 @@ public:
   vtkUltrasoundInteger64Macro(Seed);
 
   /**
+   * How much memory may hold what is made of volumes for their pairs. Where it does not last, volumes are prepared again: that
+   * takes longer and finds the same. 0: half of what is free. In [0, 1000000] GB; default 0.
+   */
+  vtkUltrasoundNumberMacro(MemoryGb);
+
+  /**
+   * A file in which aligned pairs are kept. A run that was stopped goes on from there, and pairs of which nothing has changed are
+   * not aligned again. Default none.
+   */
+  vtkUltrasoundTextMacro(FinishedPairs);
+
+  /** Whether it is only told what would be done: pairs, memory and time. No volume is moved. Default off. */
+  vtkUltrasoundSwitchMacro(DryRun);
+
+  /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
    * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
@@ -192,9 +208,17 @@ public:
    * What the last update did, as JSON: {"volumes": [{"name", "verdict", "reason", "error_mm", "similarity",
    * "overlap", "centre", "covariance"}, ...], "pairs": [{"fixed", "moving" (from 0), "verdict", "reason", "score", "similarity",
    * "overlap", "peak_ratio", "split_mm", "error_mm", "voted_down", "stands", "attempts", "residual_mm", "anywhere", "seconds":
-   * {"global", "local", "confidence"}}, ...], "seconds": {"prepare", "pairs", "graph"}}. Empty when it failed.
+   * {"global", "local", "confidence"}}, ...], "seconds": {"prepare", "pairs", "graph"}, "pairs_finished_before",
+   * "times_prepared", "prepared_bytes"}. Empty when it failed.
    */
   std::string GetReport() const;
+
+  /**
+   * After a dry run what would be done, as JSON: {"pairs": [[fixed, moving (from 0)], ...], "pairs_finished_before",
+   * "times_prepared", "bytes_per_volume", "bytes_of_all", "budget_bytes", "seconds_per_pair", "seconds_per_volume", "seconds"}.
+   * Pairs that are tried again come on top of it. Otherwise empty.
+   */
+  std::string GetPlan() const;
 
   ///@{
   /** Names of the field data. */
@@ -213,6 +237,11 @@ public:
   const echorama::AlignVolumesResult& Result() const
   {
     return this->Found;
+  }
+  /// Of the last dry run, for C++.
+  const echorama::AlignVolumesPlan& Plan() const
+  {
+    return this->Planned;
   }
 #endif
 
@@ -233,12 +262,13 @@ private:
 
   struct Settings {
     int fixedVolume = 0;
-    bool useReliability = true;
+    bool useReliability = true, dryRun = false;
     echorama::AlignVolumesParameters align;
   };
   Settings Values;
   echorama::LandmarkInput Landmarks;
   echorama::AlignVolumesResult Found;
+  echorama::AlignVolumesPlan Planned;
 #endif
 };
 

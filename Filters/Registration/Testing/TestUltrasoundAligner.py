@@ -2,6 +2,8 @@
 """The wrapped aligner and score: motions found, voxels shared, geometry and ProbeToWorld moved, errors that say why."""
 import json
 import math
+import os
+import tempfile
 
 import numpy as np
 from vtkmodules.util.numpy_support import numpy_to_vtk
@@ -126,6 +128,41 @@ assert np.abs(geometry(output.GetBlock(1)) - geometry(b)).max() < 0.5
 assert 0.4 < align.GetOverlap(1) < 1 and align.GetOverlap(0) == align.GetOverlap(1), "two volumes, one pair"
 assert output.GetBlock(1).GetFieldData().GetArray("AlignmentOverlap").GetValue(0) == align.GetOverlap(1)
 assert not align.GetPose(2, vtkMatrix4x4()) and align.GetNumberOfVolumes() == 2
+
+# 1b. a dry run moves nothing; a pair that is in the file is not aligned again unless a volume has changed; memory changes nothing
+with tempfile.TemporaryDirectory() as folder:
+    known = os.path.join(folder, "pairs.json")
+
+    def again(*images, memory=0.0):
+        filter = aligner(*images)
+        filter.SetFinishedPairs(known)
+        filter.SetMemoryGb(memory)
+        filter.Update()
+        pose = vtkMatrix4x4()
+        assert filter.GetPose(1, pose)
+        return numbers(pose), json.loads(filter.GetReport())
+
+    first, report = again(a, wrong)
+    assert (report["pairs_finished_before"], report["times_prepared"]) == (0, 2) and report["prepared_bytes"] > 1e5
+    assert align.GetPose(1, (pose := vtkMatrix4x4())) and np.array_equal(first, numbers(pose))
+    same, report = again(a, wrong, memory=1e-6)
+    assert (report["pairs_finished_before"], report["times_prepared"]) == (1, 0) and np.array_equal(same, first)
+    plan = aligner(a, wrong)
+    plan.SetFinishedPairs(known)
+    plan.DryRunOn()
+    plan.Update()
+    told = json.loads(plan.GetPlan())
+    assert told["pairs"] == [[0, 1]] and told["pairs_finished_before"] == 1 and told["seconds"] == 0
+    assert np.array_equal(geometry(plan.GetOutput().GetBlock(1)), before) and plan.GetReport() == ""
+    other = vtkImageData()
+    other.DeepCopy(wrong)
+    other.GetPointData().GetArray("Intensity").SetComponent(5000, 0, 77)
+    assert again(a, other)[1]["pairs_finished_before"] == 0, "one voxel is another"
+    other.DeepCopy(wrong)
+    other.GetPointData().GetArray("ValidRegion").SetComponent(5000, 0, 0)
+    assert again(a, other)[1]["pairs_finished_before"] == 0, "one voxel is not real"
+    assert again(a, knocked(wrong, np.array([[1, 0, 0, 0.5], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])))[1]["pairs_finished_before"] == 0
+    assert again(a, wrong)[1]["pairs_finished_before"] == 1
 
 # 2. composite input keeps its names; the fixed volume can be another one
 blocks = vtkMultiBlockDataSet()
