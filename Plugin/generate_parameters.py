@@ -115,6 +115,8 @@ def setters(one):
     if kind == "choice":
         lines += [f"  enum {plural(name)} {{ " + ", ".join(f"{constant(choice)} = {i}" for i, choice in enumerate(one["choices"])) + " };", ""]
     made = f"  vtkUltrasound{MACROS[kind]}Macro({name});"
+    for former in one.get("formerly", []):
+        made += f"\n  /** \\deprecated {name} now; goes in version {former['until']}. */\n  vtkUltrasound{MACROS[kind]}Macro({former['name']});"
     if kind != "choice":
         return "\n".join([comment(text), made])
     lines += ["  ///@{", comment(text), made]
@@ -170,6 +172,13 @@ def table_of(parameters):
     return "\n".join(rows) + "\n"
 
 
+def overdue(name, now):
+    """Former names of a class's parameters that were to go in this version or an earlier one."""
+    numbers = lambda version: [int(part) for part in version.split(".")]
+    return [f"{name}: {one['name']} is no longer to be called {former['name']}, which was to go in version {former['until']}; take Formerly() away"
+            for one in described(name) or [] for former in one.get("formerly", []) if numbers(former["until"]) <= numbers(now)]
+
+
 def described(name):
     """The parameters of a class, in the order in which it describes them, or None before it is built."""
     import echorama
@@ -214,6 +223,7 @@ def renewed(path, text):
 def main():
     root = pathlib.Path(os.environ.get("ECHORAMA_SOURCE_DIR") or pathlib.Path(__file__).resolve().parent.parent)
     check, stale, complaints = "--check" in sys.argv, [], []
+    version = re.search(r"project\(Echorama VERSION ([\d.]+)", (root / "CMakeLists.txt").read_text())[1]
     folders = ["Core", "Readers", "Tracking", "Filters", "Widgets"]
     files = [path for folder in folders for pattern in ("vtk*.h", "vtk*.xml") for path in (root / folder).rglob(pattern)]
     for path in sorted([*files, *(root / "Documentation").rglob("*.md"), root / "README.md"]):
@@ -225,6 +235,8 @@ def main():
         except ValueError as problem:
             complaints.append(str(problem))
             continue
+        if path.suffix == ".h":
+            complaints += overdue(path.stem, version)
         if new != text:
             stale.append(str(path.relative_to(root)))
             if not check:

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ParameterOptions.h"
+#include "Core/Base/FormerNames.h"
 #include <cctype>
 #include <CLI/Error.hpp>
+#include <iostream>
 #include <map>
+#include <utility>
 
 namespace echorama {
 namespace {
@@ -44,6 +47,24 @@ std::map<const CLI::Option*, Parameter>& Known()
   return known;
 }
 
+// The options of former names: nothing lists them, and they warn.
+void AddFormer(CLI::App* options, CLI::Option* present, const Parameter& parameter, const std::any& owner)
+{
+  for (const FormerName& name : FormerNamesOf(parameter)) {
+    Parameter former = parameter;
+    former.name = name.name;
+    CLI::Option* option = AddParameter(options, former, {}, owner);
+    const std::string flag = option->get_name(), now = present->get_name();
+    option->group("")->excludes(present)->each([options, name, flag, now, told = false](const std::string&) mutable {
+      const CLI::App* program = options;
+      while (program->get_parent())
+        program = program->get_parent();
+      if (!std::exchange(told, true))
+        std::cerr << program->get_name() << ": warning: " << name.Warning(flag, now) << std::endl;
+    });
+  }
+}
+
 } // namespace
 
 const Parameter* ParameterOf(const CLI::Option* option)
@@ -54,16 +75,22 @@ const Parameter* ParameterOf(const CLI::Option* option)
 
 CLI::Option* AddParameter(CLI::App* options, Parameter parameter, std::string flag, std::any owner)
 {
-  if (flag.empty())
+  const bool isNamedSo = flag.empty(); // a flag of its own stays when the parameter gets another name
+  if (isNamedSo)
     flag = parameter.Flag();
+  const auto remembered = [&](CLI::Option* option) {
+    Known().emplace(option, parameter);
+    if (isNamedSo)
+      AddFormer(options, option, parameter, owner);
+    return option;
+  };
   if (const auto* place = std::get_if<bool*>(&parameter.value)) {
     const bool wanted = !**place;
     if (!wanted && flag.rfind("--no-", 0) != 0)
       flag.insert(2, "no-");
     CLI::Option* option = options->add_flag_callback(
         flag, [target = *place, wanted, owner] { *target = wanted; }, FlagHelp(HelpOf(parameter), wanted));
-    Known().emplace(option, std::move(parameter));
-    return option;
+    return remembered(option);
   }
   const std::string help = HelpOf(parameter);
   const bool isVector = std::holds_alternative<Eigen::Vector3d*>(parameter.value);
@@ -84,8 +111,7 @@ CLI::Option* AddParameter(CLI::App* options, Parameter parameter, std::string fl
   option->default_str(parameter.Text())->allow_extra_args(false); // files may follow
   if (isVector)
     option->delimiter(','); // 3D Slicer writes 1,2,3
-  Known().emplace(option, std::move(parameter));
-  return option;
+  return remembered(option);
 }
 
 } // namespace echorama

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Parameters.h"
+#include "Core/Base/FormerNames.h"
 #include "Core/Base/JoinedText.h"
 #include "Core/Base/Json.h"
 #include "Core/Base/NumberText.h"
@@ -349,6 +350,8 @@ std::string DescriptionText(const ParameterList& parameters)
       one["when"] = {{"name", parameter.whenName}, {"values", parameter.whenValues}};
     if (parameter.advanced)
       one["advanced"] = true;
+    for (const FormerName& former : FormerNamesOf(parameter))
+      one["formerly"].push_back({{"name", former.name}, {"until", former.until}});
     one["help"] = parameter.help;
     list.push_back(std::move(one));
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundParameters.h"
 
+#include "Core/Base/FormerNames.h"
 #include "Core/Base/NumberText.h"
 #include "vtkObject.h"
 
@@ -12,7 +13,8 @@ template <class Action, class T>
 T With(vtkObject* self, echorama::ParameterList& parameters, const char* name, T otherwise, const Action& action)
 {
   try {
-    return action(echorama::Named(parameters, name ? name : ""));
+    const auto warn = [self](const std::string& text) { vtkWarningWithObjectMacro(self, << text); };
+    return action(echorama::NamedOrFormerly(parameters, name ? name : "", warn));
   } catch (const echorama::Error& problem) {
     vtkErrorWithObjectMacro(self, << problem.what());
     return otherwise;

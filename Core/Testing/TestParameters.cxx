@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/FormerNames.h"
 #include "Core/Base/Json.h"
 #include "Core/Base/Parameters.h"
 #include <functional>
@@ -218,6 +219,60 @@ TEST(Parameters, TellAllOfThemAsJson)
   EXPECT_EQ(list[4]["value"], 1);
   EXPECT_EQ(list[6]["value"], (nlohmann::json{1.0, 2.0, 3.0}));
   EXPECT_FALSE(list[3].contains("low"));
+}
+
+struct Renamed {
+  double lengthMm = 1.5;
+  bool isFast = false;
+};
+
+ParameterList Describe(Renamed& r)
+{
+  return {Formerly(Parameter("LengthMm", r.lengthMm, {0, 10}, "mm", "How long it is."), "SizeMm", "9.1"),
+          Formerly(Formerly(Parameter("IsFast", r.isFast, "Whether it runs."), "Quick", "9.1"), "Hasty", "9.2")};
+}
+
+TEST(FormerNames, SetTheSameValueAndWarn)
+{
+  Renamed values;
+  std::string warning;
+  const auto warn = [&warning](const std::string& text) { warning += text; };
+  ParameterList list = Describe(values);
+  NamedOrFormerly(list, "SizeMm", warn).Set("7.5");
+  EXPECT_EQ(values.lengthMm, 7.5);
+  EXPECT_EQ(warning, "SizeMm is now LengthMm; the former name goes in version 9.1");
+  warning.clear();
+  NamedOrFormerly(list, "Hasty", warn).Set("on");
+  EXPECT_TRUE(values.isFast);
+  EXPECT_EQ(warning, "Hasty is now IsFast; the former name goes in version 9.2");
+  warning.clear();
+  NamedOrFormerly(list, "LengthMm", warn).Set("2");
+  EXPECT_EQ(values.lengthMm, 2.0);
+  EXPECT_EQ(warning, "");
+  EXPECT_EQ(MessageOf([&] { NamedOrFormerly(list, "Sizemm", warn); }),
+            "there is no parameter 'Sizemm'; there are LengthMm, IsFast");
+}
+
+TEST(FormerNames, AreThoseOfOneDescription)
+{
+  Renamed values;
+  for (int i = 0; i < 3; ++i) // descriptions are made again and again
+    EXPECT_EQ(FormerNamesOf(Describe(values)[1]).size(), 2u);
+  double other = 0.0;
+  ParameterList list{Parameter("LengthMm", other, {0, 10}, "mm", "Of something else."),
+                     Parameter("SizeMm", other, {0, 10}, "mm", "Its own.")};
+  EXPECT_TRUE(FormerNamesOf(list[0]).empty());
+  EXPECT_EQ(&NamedOrFormerly(list, "SizeMm", [](const std::string&) { ADD_FAILURE(); }), &list[1]);
+}
+
+TEST(FormerNames, AreDescribed)
+{
+  Renamed values;
+  const auto json = nlohmann::json::parse(DescriptionText(Describe(values)));
+  EXPECT_EQ(json[0]["formerly"].dump(), R"([{"name":"SizeMm","until":"9.1"}])");
+  EXPECT_EQ(json[1]["formerly"].size(), 2u);
+  double other = 0.0;
+  EXPECT_FALSE(nlohmann::json::parse(DescriptionText({Parameter("Other", other, {}, "", "One.")}))[0].contains("formerly"));
 }
 
 } // namespace
