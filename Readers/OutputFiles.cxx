@@ -2,12 +2,10 @@
 #include "Readers/OutputFiles.h"
 
 #include "Core/Base/Error.h"
-#include "Core/Base/FileReplacement.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/VolumeFile.h"
 #include <algorithm>
 #include <cerrno>
-#include <cstdlib>
 #include <cstring>
 #include <unistd.h>
 
@@ -132,10 +130,16 @@ OutputFolder::OutputFolder(const std::string& path, const std::vector<std::strin
     else if (error)
       Fail(folder_, "the folder cannot be made: " + error.message());
   }
-  std::string pattern = (folder_ / ".echorama-XXXXXX").string();
-  if (!mkdtemp(pattern.data()))
+  // Of this machine: others may write to a shared folder at the same time, and their processes are not known here.
+  if (access(folder_.c_str(), W_OK | X_OK) != 0)
     Fail(folder_, std::string("the folder cannot be written in: ") + std::strerror(errno));
-  stage_ = pattern;
+  char machine[65] = "";
+  gethostname(machine, sizeof machine - 1);
+  stage_ = place_.Stage((folder_ / (std::string(machine) + ".files")).string());
+  std::error_code error;
+  fs::remove(stage_, error);
+  if (!fs::create_directory(stage_, error))
+    Fail(folder_, "the folder cannot be written in: " + error.message());
 }
 
 OutputFolder::~OutputFolder()

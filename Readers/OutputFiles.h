@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/FileReplacement.h"
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -50,6 +51,7 @@ public:
 
 private:
   std::vector<std::string> inputs_, names_;
+  FileReplacement place_; ///< what gives stage_ its name, and removes what a killed process left of that name
   std::filesystem::path folder_, stage_;
   std::vector<std::filesystem::path> made_; ///< folders that were not there, outermost first
 };

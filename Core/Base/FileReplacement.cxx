@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <fcntl.h>
 #include <filesystem>
@@ -26,9 +28,20 @@ namespace {
 std::string NameBeside(const fs::path& target, const char* purpose)
 {
   static std::atomic<unsigned> counter{0};
-  return (target.parent_path() / ("." + std::string(purpose) + std::to_string(getpid()) + "-" + std::to_string(counter++) + "-" +
-                                  target.filename().string()))
-      .string();
+  const std::string name = target.filename().string(),
+                    mark = "." + std::string(purpose) + std::to_string(getpid()) + "-" + std::to_string(counter++) + "-";
+  return (target.parent_path() / (mark + name.substr(name.size() - std::min(name.size(), 255 - mark.size())))).string();
+}
+
+// Removes what processes that were killed left beside the target under such names.
+void RemoveAbandoned(const fs::path& target, const std::string& purpose)
+{
+  std::error_code error;
+  for (fs::directory_iterator entry(target.parent_path() / ".", error), end; !error && entry != end; entry.increment(error))
+    if (const std::string name = entry->path().filename().string();
+        name.rfind("." + purpose, 0) == 0 && name.substr(name.find('-', name.find('-') + 1) + 1) == target.filename() &&
+        kill(std::atoi(name.c_str() + 1 + purpose.size()), 0) != 0 && errno == ESRCH)
+      fs::remove_all(entry->path(), error);
 }
 
 // An empty file beside the target that was not there before: whoever put a link in its place is not followed.
@@ -69,8 +82,7 @@ std::string FileReplacement::Stage(const std::string& path)
     Fail(path, "there is no folder " + folder.string());
   if (fs::exists(target, error) && !fs::is_regular_file(target, error))
     Fail(path, "it is there and is not a plain file");
-  if (access(folder.c_str(), W_OK) != 0)
-    Fail(path, "the folder " + folder.string() + " cannot be written");
+  RemoveAbandoned(target, "part");
   items_.push_back({NewFileBeside(target), target.string(), {}, false});
   return items_.back().temporary;
 }
@@ -95,32 +107,29 @@ void FileReplacement::Commit()
     if (!item.temporary.empty() && fs::file_size(item.temporary, error) == 0)
       Fail(item.target, "nothing was written; what was there is left as it was");
   const bool alone = items_.size() == 1 && !items_.front().temporary.empty();
-  if (!alone) {
-    for (auto item = items_.rbegin(); item != items_.rend(); ++item)
-      if (fs::is_regular_file(item->target, error)) {
-        const std::string aside = NameBeside(item->target, "old");
-        fs::rename(item->target, aside, error);
-        if (error) {
-          RollBack();
-          Fail(item->target, "it cannot be replaced (" + error.message() + ")");
-        }
-        item->aside = aside;
+  for (auto item = items_.rbegin(); !alone && item != items_.rend(); ++item)
+    if (fs::is_regular_file(item->target, error)) {
+      item->aside = NameBeside(item->target, "old");
+      fs::rename(item->target, item->aside, error);
+      if (error) {
+        RollBack();
+        Fail(item->target, "it cannot be replaced (" + error.message() + ")");
       }
-  }
+    }
   for (Item& item : items_) {
     if (item.temporary.empty())
       continue;
     fs::rename(item.temporary, item.target, error);
     if (error) {
-      const std::string reason = error.message();
       RollBack();
-      Fail(item.target, "the finished file cannot be put in place (" + reason + ")");
+      Fail(item.target, "the finished file cannot be put in place (" + error.message() + ")");
     }
     item.placed = true;
   }
-  for (const Item& item : items_)
-    if (!item.aside.empty())
-      fs::remove(item.aside, error);
+  for (const Item& item : items_) {
+    fs::remove(item.aside, error); // if there is one
+    RemoveAbandoned(item.target, "old");
+  }
   items_.clear();
 }
 

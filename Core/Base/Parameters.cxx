@@ -18,8 +18,7 @@ struct Overloaded : Ts... {
 template <class... Ts>
 Overloaded(Ts...) -> Overloaded<Ts...>;
 
-// The words of "DetailScaleMm", each from its capital on. Capitals in a row are one word ("UseMRIMask" has three), and so are
-// these units.
+// The words of "DetailScaleMm", each from its capital on. Capitals in a row ("UseMRIMask" has three words) and units are one.
 std::vector<std::string> WordsOf(const std::string& name)
 {
   std::vector<std::string> words;

@@ -14,8 +14,7 @@ namespace echorama {
 namespace {
 
 // These threads sleep nearly always, and what they wake for is late when they must wait for a turn. Since 6.12, Linux lets a
-// thread ask for short turns, which come the sooner, by the field that holds the run time of other policies; before, it ignores
-// it.
+// thread ask for short turns, which come the sooner, by the field of other policies' run time; before, it ignores it.
 void AskForShortTurns()
 {
 #ifdef SYS_sched_getattr

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Geometry/ImageGeometry.h"
 #include "Core/Base/Error.h"
-#include <algorithm>
-#include <cmath>
 #include <limits>
-#include <sstream>
 
 namespace echorama {
 

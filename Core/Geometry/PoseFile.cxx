@@ -6,7 +6,6 @@
 #include "Core/Base/TextFile.h"
 #include "Core/Geometry/PoseJson.h"
 #include <filesystem>
-#include <fstream>
 #include <set>
 
 namespace fs = std::filesystem;

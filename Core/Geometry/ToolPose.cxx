@@ -7,8 +7,7 @@ namespace echorama {
 
 namespace {
 
-// What the key of a line "key = value" cannot hold becomes "_". Letters beyond ASCII stay: to drop them would make one tool of
-// two.
+// What the key of a line "key = value" cannot hold becomes "_". Letters beyond ASCII stay: else two tools could become one.
 std::string PlainName(std::string_view name)
 {
   std::string clean;

@@ -23,7 +23,6 @@
 #include "vtkUltrasoundAcquisition.h"
 #include "vtkUltrasoundLandmarkField.h"
 
-#include <cstring>
 #include <new>
 
 using echorama::Error;

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <map>
 #include <sstream>
+#include <sys/wait.h>
 #include <unistd.h>
 
 using namespace echorama;
@@ -136,6 +137,48 @@ TEST_F(FileReplacementTest, ALinkInTheTemporaryPlaceIsNotFollowed)
   second.Commit();
   EXPECT_EQ(Contents()["victim"], "untouched");
   EXPECT_EQ(Contents()["a"], "new");
+}
+
+TEST_F(FileReplacementTest, WhatKilledProcessesLeftIsRemoved)
+{
+  const pid_t child = fork();
+  if (child == 0)
+    _exit(0);
+  ASSERT_EQ(waitpid(child, nullptr, 0), child);
+  const std::string dead = std::to_string(child), alive = std::to_string(getppid());
+  const auto name = [&](const char* purpose, const std::string& process, const char* rest) {
+    return "." + (purpose + process) + rest;
+  };
+  Put(Path("a.txt"), "old");
+  const std::string stays[] = {name("part", alive, "-0-a.txt"), name("part", dead, "-0-b.txt"), name("part", dead, "-0-b-a.txt"),
+                               name("old", dead, "-1-b-a.txt"), name("old", alive, "-1-a.txt"), ".partial-a.txt",
+                               ".part" + dead + "-a.txt",       "part" + dead + "-0-a.txt"};
+  for (const std::string& each : stays)
+    Put(Path(each), "stays");
+  Put(Path(name("part", dead, "-3-a.txt")), "half");
+  Put(Path(name("old", dead, "-4-a.txt")), "aside");
+  {
+    FileReplacement replacement;
+    Put(replacement.Stage(Path("a.txt")), "new");
+    EXPECT_FALSE(fs::exists(Path(name("part", dead, "-3-a.txt"))));
+    EXPECT_TRUE(fs::exists(Path(name("old", dead, "-4-a.txt")))) << "it may be all that is left of the old file";
+    replacement.Commit();
+  }
+  Files expected{{"a.txt", "new"}};
+  for (const std::string& each : stays)
+    expected[each] = "stays";
+  EXPECT_EQ(Contents(), expected);
+}
+
+TEST_F(FileReplacementTest, ANameMayBeAsLongAsAFileSystemTakes)
+{
+  const std::string name = std::string(251, 'x') + ".txt";
+  FileReplacement replacement;
+  const std::string temporary = replacement.Stage(Path(name));
+  EXPECT_EQ(fs::path(temporary).extension(), ".txt");
+  Put(temporary, "new");
+  replacement.Commit();
+  EXPECT_EQ(Contents(), (Files{{name, "new"}}));
 }
 
 TEST_F(FileReplacementTest, RefusesPlacesWhereNoFileCanBe)
