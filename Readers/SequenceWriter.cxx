@@ -183,13 +183,16 @@ void SequenceWriter::Finish(const Progress& progress)
   if (p.content.HasImages() && p.dataFile.empty()) {
     std::ifstream from(p.pixelPath, std::ios::binary);
     std::vector<char> piece(std::size_t{1} << 22);
-    const double all = static_cast<double>(fs::file_size(p.pixelPath));
+    std::error_code failed;
+    const double all = static_cast<double>(fs::file_size(p.pixelPath, failed));
     double done = 0.0;
     while (from.read(piece.data(), static_cast<std::streamsize>(piece.size())), from.gcount() > 0) {
       p.header.write(piece.data(), from.gcount());
       done += static_cast<double>(from.gcount());
       progress.Part(0.2, 1.0)(done / all);
     }
+    if (failed || done != all)
+      p.Fail(Error::Kind::FileSystem, "its pixels cannot be read back from the disk; what was there is left as it was");
   }
   p.header.close();
   p.CheckStreams();

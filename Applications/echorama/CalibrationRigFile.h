@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include "Filters/Registration/RigFit.h"
+#include "Filters/Calibration/RigFit.h"
 #include <string>
 #include <vector>
 

@@ -9,7 +9,7 @@ from vtkmodules.vtkCommonMath import vtkMatrix4x4
 from vtkmodules.vtkCommonTransforms import vtkTransform
 
 from echorama.EchoramaCore import vtkUltrasoundVolume
-from echorama.EchoramaFiltersRegistration import vtkUltrasoundRigFit
+from echorama.EchoramaFiltersCalibration import vtkUltrasoundRigFit
 from echorama.EchoramaFiltersAcoustics import vtkUltrasoundSynthesizer
 from echorama.EchoramaFiltersPhantoms import vtkUltrasoundAnatomySource
 

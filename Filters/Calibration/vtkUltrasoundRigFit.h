@@ -19,17 +19,17 @@
 #ifndef vtkUltrasoundRigFit_h
 #define vtkUltrasoundRigFit_h
 
-#include "EchoramaFiltersRegistrationModule.h"
+#include "EchoramaFiltersCalibrationModule.h"
 #include "vtkPolyDataAlgorithm.h"
 #include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
-#include "Filters/Registration/RigFit.h"
+#include "Filters/Calibration/RigFit.h"
 #endif
 
 class vtkMatrix4x4;
 
-class ECHORAMAFILTERSREGISTRATION_EXPORT vtkUltrasoundRigFit : public vtkPolyDataAlgorithm {
+class ECHORAMAFILTERSCALIBRATION_EXPORT vtkUltrasoundRigFit : public vtkPolyDataAlgorithm {
 public:
   static vtkUltrasoundRigFit* New();
   vtkTypeMacro(vtkUltrasoundRigFit, vtkPolyDataAlgorithm);

@@ -3,7 +3,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
-#include "Filters/Registration/RigFit.h"
+#include "Filters/Calibration/RigFit.h"
 #include "Testing/Sanitized.h"
 #include <gtest/gtest.h>
 

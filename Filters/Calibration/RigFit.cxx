@@ -422,17 +422,17 @@ std::optional<Vector3d> FitBall(const Scene& scene, const VolumeView<const float
                                                                                              : std::nullopt;
 }
 
-struct Refined {
+struct RefinedPose {
   Pose pose = Pose::Identity();
   double squared = 0.0;
   std::vector<std::optional<Vector3d>> centres;
   int found = 0;
 };
 
-Refined Refine(const Scene& scene, const VolumeView<const float>& intensity, const std::vector<RigBall>& balls, Pose pose,
-               double scale, double tolerance)
+RefinedPose Refine(const Scene& scene, const VolumeView<const float>& intensity, const std::vector<RigBall>& balls, Pose pose,
+                   double scale, double tolerance)
 {
-  Refined refined;
+  RefinedPose refined;
   for (int round = 0; round < 4; ++round) {
     refined = {};
     std::vector<Vector3d> from, to;
@@ -510,11 +510,11 @@ RigFit FitRig(const VolumeView<const float>& intensity, const VolumeView<const u
                                               " match the layout of the rig");
 
   // The few best are refined; what counts is how well they fit then.
-  std::vector<Refined> fits;
+  std::vector<RefinedPose> fits;
   for (const Match& match : matches)
     if (match.balls + 1 >= most)
       fits.push_back(Refine(scene, intensity, balls, match.rigToProbe, scale, p.toleranceMm));
-  Refined best = *std::min_element(fits.begin(), fits.end(), [](const Refined& a, const Refined& b) {
+  RefinedPose best = *std::min_element(fits.begin(), fits.end(), [](const RefinedPose& a, const RefinedPose& b) {
     return a.found != b.found ? a.found > b.found : a.squared < b.squared;
   });
   const auto check = [&] {
@@ -529,7 +529,7 @@ RigFit FitRig(const VolumeView<const float>& intensity, const VolumeView<const u
                                                 " mm (RMS) from their places, more than " + NumberText(p.largestRmsMm));
   };
   check();
-  for (const Refined& other : fits) {
+  for (const RefinedPose& other : fits) {
     double apart = 0.0;
     for (const RigBall& ball : balls)
       apart = std::max(apart, (other.pose * ball.centre - best.pose * ball.centre).norm());
@@ -543,7 +543,7 @@ RigFit FitRig(const VolumeView<const float>& intensity, const VolumeView<const u
   if (p.depthScale == 0.0) {
     // The sum of squares is a parabola near its minimum: coarse to fine around it.
     const auto cost = [&](double at) {
-      const Refined refined = Refine(scene, intensity, balls, best.pose, at, p.toleranceMm);
+      const RefinedPose refined = Refine(scene, intensity, balls, best.pose, at, p.toleranceMm);
       return refined.found < best.found ? 1e30 : refined.squared;
     };
     double step = 0.01;
