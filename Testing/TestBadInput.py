@@ -262,7 +262,7 @@ class BadInput(unittest.TestCase):
         self.refuses("--stack-spacing", ["convert", self.good, out, "--stack-spacing", 1, 1, 0], status=2)
         poses = self.path / "poses.json"
         write_poses(poses, ["good.mha"], [numpy.eye(4)])
-        self.refuses("poses.json", ["convert", poses, self.path / "other.json"])
+        self.refuses("other.json", ["convert", poses, self.path / "other.json"], ["poses become .tfm"], status=2)
 
     # Volumes that are good files and bad input.
 
