@@ -12,7 +12,7 @@ namespace {
 
 bool Hang()
 {
-  for (volatile int i = 0;; i = i + 1)
+  for (volatile unsigned i = 0;; i = i + 1) // it wraps around, where an int would be stopped by the sanitizers
     ;
 }
 

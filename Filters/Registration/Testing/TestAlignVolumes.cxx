@@ -625,7 +625,13 @@ TEST_F(AlignVolumesFile, GoesOnWhereItWasStopped)
   concernsOnly(again(), 8, 4);
   EXPECT_TRUE(again().empty());
   p.pair.points = 1234;
-  EXPECT_EQ(again().size(), 20u);
+  AlignVolumesParameters anew = p;
+  anew.resources.finishedPairs.clear();
+  ring.calls.clear();
+  AlignVolumesOnDemand(demand.volumes, 0, anew, {}, demand.Aligner());
+  const std::size_t all = ring.calls.size();
+  EXPECT_GE(all, 20u);
+  EXPECT_EQ(again().size(), all);
   demand.volumes[4].content.clear(); // not known: neither found nor kept
   concernsOnly(again(), 4, 4);
   concernsOnly(again(), 4, 4);
