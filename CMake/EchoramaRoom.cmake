@@ -128,6 +128,9 @@ macro(_echorama_add_tests name)
         add_test(NAME ${test} COMMAND ${name}Tests)
         set_tests_properties(${test} PROPERTIES LABELS "kernel;reports" TIMEOUT 900
           ENVIRONMENT "GTEST_TOTAL_SHARDS=${shards};GTEST_SHARD_INDEX=${index};GTEST_OUTPUT=xml:${ECHORAMA_TEST_REPORTS}/${test}.xml")
+        if(name MATCHES "^Tracking") # devices that deliver by the clock
+          set_property(TEST ${test} APPEND PROPERTY LABELS live)
+        endif()
       endforeach()
     endif()
     if(ECHORAMA_STACK STREQUAL "vtk")

@@ -135,7 +135,8 @@ class Counting(unittest.TestCase):
     def test_a_window_that_fails_is_tried_again_by_itself(self):
         self.add("Plain", "/bin/true")
         self.add_unsteady("Window.Late", "{}; exit 0")
-        self.expect((2, 0, 0), "once more, by themselves: Window.Late", "passed by themselves only: Window.Late")
+        self.add_unsteady("Device.Late", "{}; exit 0", label="live")
+        self.expect((3, 0, 0), "once more, by themselves: Window.Late, Device.Late", "passed by themselves only: Window.Late, Device.Late")
 
     def test_what_fails_twice_has_failed(self):
         self.add_unsteady("Window.Late", "{}; exit 0")

@@ -4,7 +4,7 @@
 
 Tests labelled `reports` leave a report of their single tests, NAME.xml in Testing/reports of the tree: GoogleTest's, QtTest's, or
 that of python_test.py. Any other test counts as one. A skip that expected_skips.txt does not name is a failure. Tests labelled
-`window` that fail beside others run once more by themselves, which is said at the end.
+`window` or `live` that fail beside others run once more by themselves, which is said at the end.
 """
 import argparse
 import collections
@@ -256,9 +256,9 @@ def run(options, count):
         old.unlink()
     told, status = run_ctest(options, entries, environment, options.jobs)
 
-    # Events that a window waits for come late where much else runs: those tests have a second try, alone, and the list says so.
+    # What a window or a live device waits for comes late where much else runs: those tests have a second try, alone, and the list says so.
     failed = [entry for entry in entries if of_ctest(told.get(entry.name), entry.name).outcome == "failed"]
-    again = [entry for entry in failed if "window" in entry.labels and entry.name in told]
+    again = [entry for entry in failed if {"window", "live"} & set(entry.labels) and entry.name in told]
     if 0 < len(again) <= MOST_AGAIN:
         for entry in again:
             (reports / f"{entry.name}.xml").unlink(missing_ok=True)
