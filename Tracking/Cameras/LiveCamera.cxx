@@ -6,6 +6,7 @@
 #include "Core/Base/FormatText.h"
 #include "Core/Base/NumberText.h"
 #include "Tracking/Stream/Clock.h"
+#include <chrono>
 #include <cmath>
 
 namespace echorama {

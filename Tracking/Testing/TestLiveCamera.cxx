@@ -4,6 +4,7 @@
 #include "Tracking/Cameras/LiveCamera.h"
 #include "Tracking/Stream/Clock.h"
 #include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <deque>
