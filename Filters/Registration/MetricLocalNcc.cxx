@@ -21,10 +21,11 @@ namespace {
 
 constexpr double WindowVoxels = 2.0; // standard deviation of the window, in voxels of the octave
 constexpr double SmoothVoxels = 0.6; // of what is compared
-// A window that the border cuts has a mean of its own: a pattern that moves with the volume and pulls the borders of both onto
-// each other. Voxels count by how much of their window is real, from nothing to all between these two.
+// What the border leaves of a window says less of the tissue around a voxel, and where its middle has been taken back to the
+// voxel (see Centre) not quite the same. Voxels count by how much of their window is real, from nothing to all between these two.
 constexpr float CutWindow = 0.6f, WholeWindow = 0.95f;
-constexpr double FloorShare = 0.6; // of the level's own standard deviation: the floor under the local one
+constexpr float LeastCentred = 0.2f, AllButWhole = 0.999f; // windows that are worth it, and need it
+constexpr double FloorShare = 0.6;                         // of the level's own standard deviation: the floor under the local one
 constexpr float LeastTrust = 0.01f;
 
 // The sums over the windows, at half the resolution along each axis whose windows are wide enough, with a rim of one cell around.
@@ -47,6 +48,7 @@ public:
     Gather(source, globalMean);
     for (Volume<float>& sums : sums_)
       GaussianSum(sums.View(), sigma);
+    Centre(sigmaVoxels);
   }
 
   /// Part of a row of voxels: the weight around each, the mean value times the weight and the mean square times the weight.
@@ -118,6 +120,51 @@ private:
           }
         }
     });
+  }
+
+  // A window that the border cuts has its middle beside its voxel, on the inner side. Its mean is that of there: a pattern that
+  // moves with the volume, with which each of two volumes pulls the other onto itself. So the mean is followed back along its
+  // slope. Where the middle is the weights tell: that of a Gaussian times w lies beside its own by its variance times the slope
+  // of log w, w being what the Gaussian leaves of the weights. The less is left, the flatter is that slope beside the tissue's:
+  // by 1 + b^2, b being how many standard deviations the middle lies beside (measured; a plane through what is left would ask for
+  // some 1 + 2 b, but tissue is no plane, and that pushes volumes apart).
+  void Centre(const Eigen::Vector3d& sigmaVoxels)
+  {
+    const VolumeView<float> weight = sums_[0].View(), value = sums_[1].View(), square = sums_[2].View();
+    const auto& n = weight.Dimensions();
+    const std::ptrdiff_t strides[3] = {1, weight.RowStride(), weight.SliceStride()};
+    float variances[3]; // in cells; a quarter of them, as slopes are over two cells
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      variances[axis] = static_cast<float>(0.25 * std::pow(sigmaVoxels[static_cast<Eigen::Index>(axis)] / step_[axis], 2));
+    Volume<float> centred(n);
+    const VolumeView<float> out = centred.View();
+    ParallelFor(n[2], [&](std::ptrdiff_t k) {
+      for (int j = 0; j < n[1]; ++j) {
+        const std::ptrdiff_t row = k * strides[2] + j * strides[1];
+        std::copy_n(&value[row], n[0], &out[row]);
+        if (k == 0 || k + 1 == n[2] || j == 0 || j + 1 == n[1])
+          continue;
+        for (std::ptrdiff_t i = row + 1; i < row + n[0] - 1; ++i) {
+          const float w = weight[i];
+          if (w < LeastCentred || w > AllButWhole)
+            continue;
+          const float mean = value[i] / w;
+          float back = 0.0f, beside2 = 0.0f;
+          for (std::size_t axis = 0; axis < 3; ++axis) {
+            const std::ptrdiff_t before = i - strides[axis], after = i + strides[axis];
+            if (!(weight[before] > 0.0f && weight[after] > 0.0f))
+              continue;
+            const float beside = variances[axis] * (weight[after] - weight[before]) / w;
+            back += beside * (value[after] / weight[after] - value[before] / weight[before]);
+            beside2 += beside * beside / variances[axis];
+          }
+          back *= 1.0f + beside2;
+          out[i] = w * (mean - back);
+          square[i] += w * back * (back - 2.0f * mean); // so that the deviation stays
+        }
+      }
+    });
+    sums_[1] = std::move(centred);
   }
 
   std::array<int, 3> step_{1, 1, 1};  // voxels of a cell along each axis

@@ -20,6 +20,9 @@ namespace {
 
 void SeeMindSsc(const MetricSource& source, MetricLevel& level)
 {
+  // What the border leaves of the window of a distance lies to one side, and so does what it tells: that pushes borders apart.
+  // Voxels count by how much is left of the most cut of their windows, from nothing to all between the last two.
+  constexpr float LeastKnown = 0.02f, Cut = 0.6f, Whole = 0.95f;
   const auto& n = level.geometry.dimensions;
   const std::ptrdiff_t count = source.intensity.Size();
   const double octaveMm = std::exp2(level.octave);
@@ -32,7 +35,7 @@ void SeeMindSsc(const MetricSource& source, MetricLevel& level)
   const Eigen::Vector3d sigma = (1.0 * octaveMm / level.geometry.spacing.array()).matrix();
 
   level.descriptors.assign(static_cast<std::size_t>(ChannelStride * count), 0);
-  Volume<float> distances(n), weights(n), mean(n), least(n, 1e30f);
+  Volume<float> distances(n), weights(n), mean(n), least(n, 1e30f), left(n, 1.0f);
   std::vector<Volume<float>> channels;
   for (std::size_t a = 0; a < 6; ++a)
     for (std::size_t b = a + 1; b < 6; ++b) {
@@ -57,11 +60,12 @@ void SeeMindSsc(const MetricSource& source, MetricLevel& level)
       GaussianSum(d, sigma);
       GaussianSum(w, sigma);
       channels.emplace_back(n);
-      const auto out = channels.back().View(), m = mean.View(), l = least.View();
+      const auto out = channels.back().View(), m = mean.View(), l = least.View(), of = left.View();
       ParallelRanges(count, 1 << 16, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
         for (std::ptrdiff_t i = begin; i < end; ++i) {
-          const float distance = w[i] > 0.02f ? d[i] / w[i] : -1.0f; // negative: not known
+          const float distance = w[i] > LeastKnown ? d[i] / w[i] : -1.0f; // negative: not known
           out[i] = distance;
+          of[i] = std::fmin(of[i], w[i]);
           if (distance >= 0.0f) {
             m[i] += distance * (1.0f / Channels);
             l[i] = std::fmin(l[i], distance);
@@ -93,16 +97,16 @@ void SeeMindSsc(const MetricSource& source, MetricLevel& level)
       const bool real = source.intensity[i] == source.intensity[i];
       unsigned char* out = &level.descriptors[static_cast<std::size_t>(ChannelStride * i)];
       const float variance = std::fmin(std::fmax(m[i], 0.05f * typical), 20.0f * typical) + 1e-20f;
-      int known = 0;
       for (std::size_t c = 0; c < Channels; ++c) {
         const float distance = channels[c].View()[i];
-        known += distance >= 0.0f;
         const float similar = distance >= 0.0f ? std::exp(-(distance - l[i]) / variance) : 0.5f;
         out[c] = static_cast<unsigned char>(std::lround(255.0f * similar));
       }
       const float texture = m[i] / (m[i] + 0.1f * typical + 1e-20f);
-      const double weight = real && known == Channels ? source.Trust(i) * std::fmax(0.01, static_cast<double>(texture)) : 0.0;
-      out[Channels] = static_cast<unsigned char>(std::lround(255.0 * weight));
+      const float share = left.View()[i], whole = std::fmin(std::fmax((share - Cut) / (Whole - Cut), 0.0f), 1.0f);
+      const float weight = std::fmax(0.01f, texture) * whole * whole * static_cast<float>(source.Trust(i));
+      const bool isSeen = real && share > LeastKnown && source.Trust(i) > 0.0;
+      out[Channels] = static_cast<unsigned char>(isSeen ? std::lround(std::fmax(1.0f, 255.0f * weight)) : 0); // 0: not there
     }
   });
 }
