@@ -7,10 +7,16 @@
 // adds to what is known. The same goes for pairs that failed from a bad start, and for those that nobody had thought to
 // overlap. That round is cheap, because the start is then as good as a tracker's.
 //
+// Ranks share the coarsest resolutions, which are made of so many volumes by each, and the pairs of a round: each aligns a piece
+// of their order for reuse, so that it prepares few of the volumes, and every rank hears of all that was found. They all solve
+// the graph, as that takes less time than the pairs.
+//
 // Cost: pairs times AlignPair. Which pairs overlap costs next to nothing (OverlappingPairs).
 #include "AlignVolumesRun.h"
+#include "Core/Base/Checksum.h"
 #include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Error.h"
+#include "Core/Sharing/ShareOut.h"
 #include "Index.h"
 #include <algorithm>
 #include <chrono>
@@ -24,6 +30,17 @@ constexpr int EnoughPairs = 3;         // a volume with fewer overlaps at the st
 constexpr int FarTries = 3;            // searches over all rotations for one volume
 constexpr std::size_t PlanSamples = 3; // pairs that are aligned to see how long they take
 constexpr double TrackedReachMm = 20.0;
+constexpr std::size_t PairsPerExchange = 32; // of a rank; what fails on one is heard by the others no later
+
+std::string About(const std::vector<std::pair<int, int>>& pairs, const std::vector<Pose>& poses)
+{
+  Packed all;
+  for (const auto& [fixed, moving] : pairs)
+    all(fixed, moving);
+  for (const Pose& pose : poses)
+    all(pose);
+  return std::to_string(pairs.size()) + " pairs " + Checksum(all.Bytes().data(), all.Bytes().size());
+}
 
 } // namespace
 
@@ -50,7 +67,7 @@ void AlignVolumesRun::Outline(int v, const Progress& progress)
     }
   };
   try {
-    if (finished_.Empty() && prepared_.HasRoom()) {
+    if (finished_.Empty() && shared_.Ranks() == 1 && prepared_.HasRoom()) {
       outlines_.emplace_back(prepared_.Get(v, progress)->placed);
       return;
     }
@@ -68,11 +85,38 @@ void AlignVolumesRun::Outline(int v, const Progress& progress)
 
 void AlignVolumesRun::OutlineAll(const Progress& progress)
 {
-  for (int v = 0; v < Count(); ++v)
-    Outline(v, progress.Part(static_cast<double>(v) / Count(), (v + 1.0) / Count()));
+  const auto [first, last] = shared_.Share(Count());
+  for (auto v = static_cast<int>(first); v < last; ++v)
+    Outline(v, progress.Part(static_cast<double>(v - first) / (last - first), (v - first + 1.0) / (last - first)));
+  if (shared_.Ranks() > 1)
+    ShareOutlines();
   const auto trouble = std::find_if(troubles_.rbegin(), troubles_.rend(), [](const std::string& text) { return !text.empty(); });
   if (std::count(troubles_.begin(), troubles_.end(), std::string()) < 2)
     throw Error(Error::Kind::BadInput, *trouble);
+}
+
+// Every rank gets the coarsest resolutions that the others have made.
+void AlignVolumesRun::ShareOutlines()
+{
+  Packed mine, about;
+  auto v = static_cast<std::size_t>(shared_.Share(Count()).first);
+  for (const VolumeOutline& outline : outlines_)
+    mine(troubles_[v++], outline.coarsest.geometry, outline.coarsest.realVoxels, outline.coarsest.intensity);
+  for (const PlacedVolume& volume : volumes_)
+    about(volume.name, volume.volumeToWorld);
+  AlignVolumesParameters described = p_;
+  for (const Parameter& parameter : Describe(described))
+    about(parameter.Text());
+  const std::string checksum = Checksum(about.Bytes().data(), about.Bytes().size());
+  outlines_.clear();
+  for (const std::string& told : shared_.Exchange(mine.Bytes(), std::to_string(Count()) + " volumes " + checksum))
+    for (Unpacked from(told); !from.AtEnd();) {
+      PlacedVolume placed = volumes_[outlines_.size()];
+      std::vector<PyramidLevel> coarsest(1);
+      placed.pyramid = &coarsest;
+      from(troubles_[outlines_.size()], coarsest[0].geometry, coarsest[0].realVoxels, coarsest[0].intensity);
+      outlines_.emplace_back(placed);
+    }
 }
 
 std::vector<AlignVolumesRun::Numbers> AlignVolumesRun::PairsAt(const std::vector<Pose>& poses, double reachMm) const
@@ -109,29 +153,64 @@ AlignVolumesRun::Question AlignVolumesRun::Ask(const Numbers& numbers, AlignStar
   return question;
 }
 
-void AlignVolumesRun::Try(const Numbers& numbers, AlignStart start, const std::vector<Pose>& poses, const Progress& progress)
+PairAlignment AlignVolumesRun::Answer(const Numbers& numbers, const Question& question, const Progress& progress)
 {
-  const Question question = Ask(numbers, start, poses);
   PairAlignment found;
   const Clock::time_point clock = Clock::now();
   const double before = featureSeconds_;
-  if (const auto known = finished_.Find(question.key)) {
-    found = *known;
-    ++finishedBefore_;
-  } else {
-    try {
-      const PreparedVolumes::Made fixed = prepared_.Get(numbers.first, progress.Part(0.0, 0.0)),
-                                  moving = prepared_.Get(numbers.second, progress.Part(0.0, 0.0));
-      found = aligner_(fixed->At(question.fixed.volumeToWorld), fixed->features, moving->At(question.moving.volumeToWorld),
-                       moving->features, question.parameters, progress);
-    } catch (const Error& error) {
-      if (Count() == 2 || (error.GetKind() != Error::Kind::BadInput && error.GetKind() != Error::Kind::NotPossible))
-        throw;
-      found.volumeToWorld = question.moving.volumeToWorld;
-      found.reason = error.what();
-    }
-    finished_.Add(question.key, found);
+  try {
+    const PreparedVolumes::Made fixed = prepared_.Get(numbers.first, progress.Part(0.0, 0.0)),
+                                moving = prepared_.Get(numbers.second, progress.Part(0.0, 0.0));
+    found = aligner_(fixed->At(question.fixed.volumeToWorld), fixed->features, moving->At(question.moving.volumeToWorld),
+                     moving->features, question.parameters, progress);
+  } catch (const Error& error) {
+    if (Count() == 2 || (error.GetKind() != Error::Kind::BadInput && error.GetKind() != Error::Kind::NotPossible))
+      throw;
+    found.volumeToWorld = question.moving.volumeToWorld;
+    found.reason = error.what();
   }
+  pairSeconds_ += SecondsSince(clock) - (featureSeconds_ - before);
+  return found;
+}
+
+// By all ranks, each a piece of those that are not known from the first one's file.
+std::vector<PairAlignment> AlignVolumesRun::Answers(const std::vector<Numbers>& pairs, AlignStart start,
+                                                    const std::vector<Pose>& poses, const Progress& progress)
+{
+  const std::string about = About(pairs, poses);
+  Packed mine;
+  for (const Numbers& pair : pairs) {
+    const auto answer = finished_.Find(Ask(pair, start, poses).key);
+    mine(answer.has_value());
+    if (answer)
+      Pack(mine, *answer);
+  }
+  const std::string told = p_.resources.finishedPairs.empty() ? mine.Bytes() : shared_.Exchange(mine.Bytes(), about).front();
+  Unpacked known(told);
+  std::vector<PairAlignment> answers(pairs.size());
+  std::vector<std::size_t> left;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    bool isKnown = false;
+    known(isKnown);
+    if (isKnown)
+      Unpack(known, answers[i]);
+    else
+      left.push_back(i);
+  }
+  finishedBefore_ += static_cast<int>(pairs.size() - left.size());
+  const auto answer = [&](std::size_t i, double begin, double end) {
+    return Answer(pairs[left[i]], Ask(pairs[left[i]], start, poses), progress.Part(begin, end));
+  };
+  const auto hear = [&](std::size_t i, const PairAlignment& found) {
+    answers[left[i]] = found;
+    finished_.Add(Ask(pairs[left[i]], start, poses).key, found);
+  };
+  ShareOut<PairAlignment>(shared_, left.size(), PairsPerExchange, about, answer, hear);
+  return answers;
+}
+
+void AlignVolumesRun::Take(const Numbers& numbers, const std::vector<Pose>& poses, const PairAlignment& found)
+{
   Attempt& attempt = attempts_[numbers];
   attempt.pair.fixed = numbers.first;
   attempt.pair.moving = numbers.second;
@@ -148,17 +227,15 @@ void AlignVolumesRun::Try(const Numbers& numbers, AlignStart start, const std::v
     attempt.edge.information = Turned(found.information, back.linear());
     attempt.edge.verified = found.verdict == Verdict::Aligned;
   }
-  pairSeconds_ += SecondsSince(clock) - (featureSeconds_ - before);
 }
 
 void AlignVolumesRun::TryAll(const std::vector<Numbers>& tried, AlignStart start, const std::vector<Pose>& poses,
                              const Progress& progress)
 {
   const std::vector<Numbers> pairs = OrderedForReuse(tried);
+  const std::vector<PairAlignment> found = Answers(pairs, start, poses, progress);
   for (std::size_t i = 0; i < pairs.size(); ++i)
-    Try(pairs[i], start, poses,
-        progress.Part(static_cast<double>(i) / static_cast<double>(pairs.size()),
-                      static_cast<double>(i + 1) / static_cast<double>(pairs.size())));
+    Take(pairs[i], poses, found[i]);
   finished_.Write();
   progress(1.0);
 }
@@ -236,11 +313,18 @@ void AlignVolumesRun::FindTheLost(const Progress& progress)
                               .norm(),
                           other});
     std::sort(others.begin(), others.end());
+    const std::size_t most = std::min(others.size(), Index(FarTries)), atOnce = Index(shared_.Ranks());
     bool isFound = false;
-    for (std::size_t i = 0; i < std::min(others.size(), Index(FarTries)) && !isFound; ++i) {
-      const Numbers pair = Ordered(v, others[i].second);
-      Try(pair, AlignStart::Unknown, graph_.volumeToWorld, progress.Part(static_cast<double>(v) / Count(), (v + 1.0) / Count()));
-      isFound = attempts_[pair].pair.alignment.verdict == Verdict::Aligned;
+    for (std::size_t i = 0; i < most && !isFound; i += atOnce) { // what comes after the first that is found does not count
+      std::vector<Numbers> pairs;
+      for (std::size_t next = i; next < std::min(i + atOnce, most); ++next)
+        pairs.push_back(Ordered(v, others[next].second));
+      const std::vector<PairAlignment> found = Answers(pairs, AlignStart::Unknown, graph_.volumeToWorld,
+                                                       progress.Part(static_cast<double>(v) / Count(), (v + 1.0) / Count()));
+      for (std::size_t pair = 0; pair < pairs.size() && !isFound; ++pair) {
+        Take(pairs[pair], graph_.volumeToWorld, found[pair]);
+        isFound = attempts_[pairs[pair]].pair.alignment.verdict == Verdict::Aligned;
+      }
     }
     if (isFound)
       Solve({});
@@ -316,6 +400,7 @@ AlignVolumesResult AlignVolumesRun::Run(const Progress& progress)
     moving.information = pair.alignment.information;
     moving.centre = pair.alignment.centre;
     StateErrors(result);
+    StateCost(result);
     return result;
   }
 
@@ -336,6 +421,7 @@ AlignVolumesResult AlignVolumesRun::Run(const Progress& progress)
   progress(1.0);
   AlignVolumesResult result = Report();
   StateErrors(result);
+  StateCost(result);
   return result;
 }
 
@@ -363,7 +449,7 @@ AlignVolumesPlan AlignVolumesRun::Plan(const Progress& progress)
   const std::size_t samples = std::min(PlanSamples, left.size());
   for (std::size_t i = 0; i < samples; ++i) {
     const auto& [pair, start] = left[(2 * i + 1) * left.size() / (2 * samples)];
-    Try(pair, start, Start(), progress.Part(0.5 + 0.5 * static_cast<double>(i) / samples, 0.5 + 0.5 * (i + 1.0) / samples));
+    Answers({pair}, start, starts, progress.Part(0.5 + 0.5 * static_cast<double>(i) / samples, 0.5 + 0.5 * (i + 1.0) / samples));
   }
   plan.budgetBytes = BudgetBytes(p_.resources);
   plan.bytesPerVolume = prepared_.LargestBytes();

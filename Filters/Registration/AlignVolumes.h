@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "AlignPair.h"
+#include "Core/Sharing/SharedWork.h"
 #include "PreparedVolumes.h"
 #include <functional>
 
@@ -21,6 +22,9 @@ struct AlignVolumesParameters {
   double outlierVoxels = 2.0, outlierSigmas = 6.0;
   std::uint64_t seed = 1; ///< of the pose graph's trees
   AlignResources resources;
+  /// The ranks that share the pairs, if there are several: each calls AlignVolumes with the same, within SharedWork::Run, and
+  /// gets the result of one rank, to the last bit. The first one keeps the file of finished pairs.
+  SharedWork* shared = nullptr;
 };
 
 ParameterList Describe(AlignVolumesParameters& p);
@@ -65,6 +69,9 @@ struct AlignVolumesResult {
   int timesPrepared = 0;       ///< how often all that pairs ask of a volume was made: more than once where memory did not last
   double preparedBytes = 0.0;  ///< the most of it that was kept at once
   int pairsFinishedBefore = 0; ///< pairs that were not aligned but known from the file
+  /// Where ranks share the work, seconds and bytes are those of the rank that needs most.
+  int ranks = 1;
+  Traffic traffic; ///< of this rank
 };
 
 /// Aligns any number of volumes: every pair that may overlap by itself, then all pairs together as a pose graph.
@@ -98,7 +105,7 @@ struct AlignVolumesPlan {
   double seconds = 0.0; ///< of all of them; pairs that are tried again, and the pose graph, come on top
 };
 
-/// Aligns only a few of the pairs, to see how long they take. \throws as AlignVolumes
+/// Aligns only a few of the pairs, to see how long they take on one rank. \throws as AlignVolumes
 AlignVolumesPlan PlanAlignment(const std::vector<VolumeOnDemand>& volumes, int fixed,
                                const AlignVolumesParameters& parameters = {}, const Progress& progress = {},
                                const PairAligner& aligner = AlignPair);

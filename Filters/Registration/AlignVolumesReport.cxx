@@ -211,4 +211,24 @@ void AlignVolumesRun::StateErrors(AlignVolumesResult& result) const
   }
 }
 
+// Of all ranks.
+void AlignVolumesRun::StateCost(AlignVolumesResult& result)
+{
+  Packed mine;
+  mine(result.featureSeconds, result.pairSeconds, result.graphSeconds, result.preparedBytes, result.timesPrepared);
+  result.timesPrepared = 0;
+  for (const std::string& told : shared_.Exchange(mine.Bytes())) {
+    AlignVolumesResult its;
+    Unpacked from(told);
+    from(its.featureSeconds, its.pairSeconds, its.graphSeconds, its.preparedBytes, its.timesPrepared);
+    result.featureSeconds = std::max(result.featureSeconds, its.featureSeconds);
+    result.pairSeconds = std::max(result.pairSeconds, its.pairSeconds);
+    result.graphSeconds = std::max(result.graphSeconds, its.graphSeconds);
+    result.preparedBytes = std::max(result.preparedBytes, its.preparedBytes);
+    result.timesPrepared += its.timesPrepared;
+  }
+  result.ranks = shared_.Ranks();
+  result.traffic = shared_.Told();
+}
+
 } // namespace echorama

@@ -17,9 +17,10 @@ public:
 
   AlignVolumesRun(const std::vector<VolumeOnDemand>& volumes, int fixed, const AlignVolumesParameters& p,
                   const PairAligner& aligner)
-    : sources_(volumes), fixed_(fixed), p_(p), aligner_(aligner),
-      prepared_(BudgetBytes(p.resources), [this](int v, const Progress& progress) { return Prepare(v, progress); }),
-      finished_(p.resources.finishedPairs), troubles_(volumes.size()), held_(volumes.size(), false)
+    : sources_(volumes), fixed_(fixed), p_(p), aligner_(aligner), shared_(p.shared ? *p.shared : alone_),
+      prepared_(BudgetBytes(p.resources) / (p.resources.memoryGb > 0.0 ? 1 : shared_.Ranks()), // they may be on one machine
+                [this](int v, const Progress& progress) { return Prepare(v, progress); }),
+      finished_(shared_.Rank() == 0 ? p.resources.finishedPairs : ""), troubles_(volumes.size()), held_(volumes.size(), false)
   {
     for (const VolumeOnDemand& volume : volumes)
       volumes_.push_back(volume.placed);
@@ -63,9 +64,13 @@ private:
   PreparedVolumes::Made Prepare(int v, const Progress& progress);
   void Outline(int v, const Progress& progress);
   void OutlineAll(const Progress& progress);
+  void ShareOutlines();
   std::vector<Numbers> PairsAt(const std::vector<Pose>& poses, double reachMm) const;
   std::vector<Numbers> PairsWithLandmarks() const;
-  void Try(const Numbers& pair, AlignStart start, const std::vector<Pose>& poses, const Progress& progress);
+  PairAlignment Answer(const Numbers& pair, const Question& question, const Progress& progress);
+  std::vector<PairAlignment> Answers(const std::vector<Numbers>& pairs, AlignStart start, const std::vector<Pose>& poses,
+                                     const Progress& progress);
+  void Take(const Numbers& pair, const std::vector<Pose>& poses, const PairAlignment& found);
   void TryAll(const std::vector<Numbers>& pairs, AlignStart start, const std::vector<Pose>& poses, const Progress& progress);
   void Solve(const Progress& progress);
   PoseEdge AsSeenFromFixed(PoseEdge edge) const;
@@ -77,6 +82,7 @@ private:
   AlignVolumesResult Report() const;
   std::vector<bool> JoinedByClearPairs() const;
   void StateErrors(AlignVolumesResult& result) const;
+  void StateCost(AlignVolumesResult& result);
   std::string WhyDoubtful(int v) const;
   std::string WhyFailed(int v) const;
 
@@ -85,6 +91,8 @@ private:
   const int fixed_;
   const AlignVolumesParameters& p_;
   const PairAligner& aligner_;
+  SharedWork alone_;
+  SharedWork& shared_;
   PreparedVolumes prepared_;
   FinishedPairs finished_;
   int finishedBefore_ = 0;

@@ -56,7 +56,10 @@ Json ToJson(const AlignVolumesResult& result, int first)
           {"seconds", {{"prepare", result.featureSeconds}, {"pairs", result.pairSeconds}, {"graph", result.graphSeconds}}},
           {"pairs_finished_before", result.pairsFinishedBefore},
           {"times_prepared", result.timesPrepared},
-          {"prepared_bytes", result.preparedBytes}};
+          {"prepared_bytes", result.preparedBytes},
+          {"ranks", result.ranks},
+          {"messages", result.traffic.messages},
+          {"message_bytes", result.traffic.bytesSent}};
 }
 
 Json ToJson(const AlignVolumesPlan& plan, int first)

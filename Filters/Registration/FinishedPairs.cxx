@@ -38,6 +38,13 @@ void ForEachNumber(Alignment& a, const Visit& visit)
   visit("confidence_seconds", a.confidenceSeconds);
 }
 
+template <class Bytes, class Alignment>
+void PackOrUnpack(Bytes& bytes, Alignment& a)
+{
+  bytes(a.verdict, a.reason, a.anywhere, a.volumeToWorld, a.centre, a.information);
+  ForEachNumber(a, [&bytes](const char*, auto& value) { bytes(value); });
+}
+
 bool IsFinite(const PairAlignment& a)
 {
   bool isFinite = a.volumeToWorld.matrix().allFinite() && a.centre.allFinite() && a.information.allFinite();
@@ -158,6 +165,16 @@ void FinishedPairs::Write()
   WriteTextFile(path_, text + "\n]}\n");
   isChanged_ = false;
   written_ = Clock::now();
+}
+
+void Pack(Packed& to, const PairAlignment& pair)
+{
+  PackOrUnpack(to, pair);
+}
+
+void Unpack(Unpacked& from, PairAlignment& pair)
+{
+  PackOrUnpack(from, pair);
 }
 
 } // namespace echorama

@@ -2,6 +2,7 @@
 #pragma once
 #include "AlignPair.h"
 #include "Core/Base/ElapsedTime.h"
+#include "Core/Sharing/Packing.h"
 #include <map>
 #include <optional>
 
@@ -40,5 +41,9 @@ private:
   bool isChanged_ = false;
   Clock::time_point written_ = Clock::now();
 };
+
+/// A pair as another rank is told of it, to the last bit.
+void Pack(Packed& to, const PairAlignment& pair);
+void Unpack(Unpacked& from, PairAlignment& pair);
 
 } // namespace echorama

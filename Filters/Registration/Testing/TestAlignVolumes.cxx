@@ -4,6 +4,7 @@
 #include "Filters/Registration/AlignVolumes.h"
 #include "Filters/Registration/Metric.h"
 #include "Testing/TemporaryFolder.h"
+#include "Testing/ThreadRanks.h"
 #include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
@@ -696,6 +697,143 @@ TEST(AlignVolumes, ThePlanIsWhatIsDone)
   const AlignVolumesPlan tight = PlanAlignment(little.volumes, 0, p, {}, little.Aligner());
   EXPECT_GT(tight.timesPrepared, 10);
   EXPECT_LT(tight.timesPrepared, static_cast<int>(2 * tight.pairs.size()));
+}
+
+// What ranks that share the pairs find, each with a ring of its own; \a calls of all of them.
+std::vector<AlignVolumesResult> ByRanks(int ranks, const std::function<void(Ring&, AlignVolumesParameters&)>& change,
+                                        std::vector<std::pair<Numbers, AlignStart>>* calls = nullptr)
+{
+  std::vector<AlignVolumesResult> results(Index(ranks));
+  std::mutex mutex;
+  const auto errors = ThreadRanks(ranks).Run([&](SharedWork& shared) {
+    Ring ring;
+    AlignVolumesParameters p = Tracked();
+    change(ring, p);
+    p.shared = &shared;
+    OnDemand demand(ring);
+    results[Index(shared.Rank())] = AlignVolumesOnDemand(demand.volumes, 0, p, {}, demand.Aligner());
+    const std::lock_guard<std::mutex> lock(mutex);
+    if (calls)
+      calls->insert(calls->end(), ring.calls.begin(), ring.calls.end());
+  });
+  EXPECT_EQ(errors, std::vector<std::string>(Index(ranks)));
+  return results;
+}
+
+TEST(AlignVolumes, RanksFindWhatOneFinds)
+{
+  const auto lies = [](Ring& ring, AlignVolumesParameters&) { // a second round
+    ring.Lie(2, 4, 1);
+    ring.Lie(7, 8, 2);
+  };
+  const auto lost = [](Ring& ring, AlignVolumesParameters& p) {
+    p.pair.start = AlignStart::Automatic;
+    ring.starts[3].translation() += Eigen::Vector3d(500.0, 0.0, 0.0);
+    ring.starts[6].translation() += Eigen::Vector3d(0.0, 500.0, 0.0);
+    ring.verdicts[{2, 3}] = Verdict::Ambiguous; // one of the first that are tried
+  };
+  const auto dull = [](Ring& ring, AlignVolumesParameters&) {
+    for (const std::size_t v : {1u, 9u})
+      for (PyramidLevel& level : ring.pyramids[v])
+        for (float& voxel : level.intensity.View())
+          voxel = 7.0f;
+  };
+  const std::vector<std::function<void(Ring&, AlignVolumesParameters&)>> cases{lies, lost, dull};
+  for (std::size_t n = 0; n < cases.size(); ++n) {
+    std::vector<std::pair<Numbers, AlignStart>> alone;
+    const AlignVolumesResult one = ByRanks(1, cases[n], &alone).front();
+    EXPECT_EQ(one.traffic.messages, 0);
+    std::sort(alone.begin(), alone.end());
+    for (const int ranks : {2, 3, 8}) {
+      std::vector<std::pair<Numbers, AlignStart>> shared;
+      for (const AlignVolumesResult& result : ByRanks(ranks, cases[n], &shared)) {
+        ExpectSame(one, result);
+        EXPECT_EQ(result.ranks, ranks);
+        EXPECT_GT(result.traffic.messages, 0);
+        EXPECT_GE(result.timesPrepared, 8);
+      }
+      std::sort(shared.begin(), shared.end());
+      if (n != 1) { // what is lost is looked for in several places at once
+        EXPECT_EQ(shared, alone) << "every pair is aligned by one rank";
+      }
+      EXPECT_TRUE(std::includes(shared.begin(), shared.end(), alone.begin(), alone.end()));
+    }
+  }
+}
+
+TEST(AlignVolumes, TwoVolumesAreForOneOfTheRanks)
+{
+  const auto pair = [](Ring& ring, AlignVolumesParameters&) { ring = Ring(2); };
+  std::vector<std::pair<Numbers, AlignStart>> calls;
+  const AlignVolumesResult one = ByRanks(1, pair).front();
+  for (const AlignVolumesResult& result : ByRanks(3, pair, &calls))
+    ExpectSame(one, result);
+  EXPECT_EQ(calls.size(), 1u);
+}
+
+TEST(AlignVolumes, OneRankThatFailsEndsAll)
+{
+  for (const auto kind : {Error::Kind::FileSystem, Error::Kind::Cancelled}) {
+    const auto errors = ThreadRanks(3).Run([kind](SharedWork& shared) {
+      Ring ring;
+      AlignVolumesParameters p = Tracked();
+      p.shared = &shared;
+      const PairAligner inner = ring.Aligner();
+      AlignVolumes(ring.Volumes(), 0, p, {},
+                   [&](const auto& fixed, const auto& ofFixed, const auto& moving, const auto& ofMoving, const auto& q,
+                       const auto& progress) {
+                     if (shared.Rank() == 2 && ring.calls.size() == 3)
+                       throw Error(kind, "the share is gone");
+                     return inner(fixed, ofFixed, moving, ofMoving, q, progress);
+                   });
+    });
+    for (const std::string& error : errors)
+      EXPECT_EQ(error, kind == Error::Kind::Cancelled ? "the share is gone" : "rank 2: the share is gone");
+  }
+  // Not the same volumes, nor the same parameters.
+  const auto differ = ThreadRanks(2).Run([](SharedWork& shared) {
+    Ring ring;
+    AlignVolumesParameters p = Tracked();
+    p.pair.points += shared.Rank();
+    p.shared = &shared;
+    AlignVolumes(ring.Volumes(), 0, p, {}, ring.Aligner());
+  });
+  for (const std::string& error : differ)
+    EXPECT_NE(error.find("the ranks do not work on the same (10 volumes "), std::string::npos) << error;
+}
+
+TEST_F(AlignVolumesFile, TheFirstRankKeepsTheFile)
+{
+  const std::string path = Path("finished.json");
+  const auto withFile = [&path](Ring& ring, AlignVolumesParameters& p) {
+    ring.Lie(2, 4, 1);
+    p.resources.finishedPairs = path;
+  };
+  std::vector<std::pair<Numbers, AlignStart>> calls;
+  const AlignVolumesResult first = ByRanks(3, withFile, &calls).front();
+  EXPECT_EQ(first.pairsFinishedBefore, 0);
+  EXPECT_GT(calls.size(), 20u);
+  // Whatever number of ranks goes on from it, no pair is aligned.
+  for (const int ranks : {1, 2, 5}) {
+    const std::size_t before = calls.size();
+    for (const AlignVolumesResult& result : ByRanks(ranks, withFile, &calls)) {
+      ExpectSame(first, result);
+      EXPECT_EQ(result.pairsFinishedBefore, static_cast<int>(before));
+    }
+    EXPECT_EQ(calls.size(), before);
+  }
+  WriteTextFile(path, "poses of mine");
+  const auto errors = ThreadRanks(2).Run([&](SharedWork& shared) {
+    Ring ring(4);
+    OnDemand demand(ring);
+    AlignVolumesParameters p = Tracked();
+    p.shared = &shared;
+    p.resources.finishedPairs = path;
+    AlignVolumesOnDemand(demand.volumes, 0, p, {}, demand.Aligner());
+  });
+  for (const std::string& error : errors)
+    EXPECT_EQ(error.find("rank 0: " + path), 0u) << error;
+  EXPECT_EQ(ReadTextFile(path), "poses of mine");
 }
 
 TEST(AlignVolumes, RefusesWhatIsWrong)
