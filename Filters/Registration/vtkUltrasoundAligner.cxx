@@ -5,10 +5,12 @@
 #include "Core/Base/Checksum.h"
 #include "Core/Base/SizeText.h"
 #include "Core/Geometry/MatrixRows.h"
+#include "Core/Sharing/ControllerWork.h"
 #include "PreparedVolume.h"
 #include "vtkFieldData.h"
 #include "vtkImageData.h"
 #include "vtkMatrix4x4.h"
+#include "vtkMultiProcessController.h"
 #include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkUltrasoundAcquisition.h"
@@ -81,10 +83,22 @@ echorama::ParameterList vtkUltrasoundAligner::Parameters()
 }
 
 //----------------------------------------------------------------------------
-vtkUltrasoundAligner::vtkUltrasoundAligner() = default;
+vtkUltrasoundAligner::vtkUltrasoundAligner()
+{
+  this->SetController(vtkMultiProcessController::GetGlobalController());
+}
 
 //----------------------------------------------------------------------------
-vtkUltrasoundAligner::~vtkUltrasoundAligner() = default;
+vtkUltrasoundAligner::~vtkUltrasoundAligner()
+{
+  this->SetController(nullptr);
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundAligner::SetController(vtkMultiProcessController* controller)
+{
+  vtkSetObjectBodyMacro(Controller, vtkMultiProcessController, controller);
+}
 
 //----------------------------------------------------------------------------
 void vtkUltrasoundAligner::AddHeldVolume(int volume)
@@ -142,6 +156,19 @@ void vtkUltrasoundAligner::Execute(vtkInformationVector** inputs, vtkInformation
 {
   this->Found = {};
   this->Planned = {};
+  echorama::ControllerWork<vtkMultiProcessController> shared(this->Controller);
+  try {
+    shared.Run([&] { this->Align(inputs, outputs, shared, progress); });
+  } catch (...) {
+    this->Found = {}; // another rank may have failed after this one was done
+    throw;
+  }
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundAligner::Align(vtkInformationVector** inputs, vtkInformationVector* outputs, echorama::SharedWork& shared,
+                                 const echorama::Progress& progress)
+{
   echorama::CheckRanges(this->Parameters());
   const auto volumes = vtkUltrasoundVolume::CollectInputs(this, inputs[0]);
   auto landmarks = this->Landmarks.Lists(static_cast<int>(volumes.size()));
@@ -166,7 +193,9 @@ void vtkUltrasoundAligner::Execute(vtkInformationVector** inputs, vtkInformation
 
   // 2. where they belong
   if (this->Values.dryRun) {
-    this->Planned = echorama::PlanAlignment(demanded, this->Values.fixedVolume, this->Values.align, progress);
+    if (shared.Rank() == 0) {
+      this->Planned = echorama::PlanAlignment(demanded, this->Values.fixedVolume, this->Values.align, progress);
+    }
     for (std::size_t i = 0; i < volumes.size(); ++i) {
       vtkNew<vtkImageData> same;
       same->ShallowCopy(volumes[i].Image);
@@ -174,8 +203,9 @@ void vtkUltrasoundAligner::Execute(vtkInformationVector** inputs, vtkInformation
     }
     return;
   }
-  echorama::AlignVolumesResult found =
-      echorama::AlignVolumesOnDemand(demanded, this->Values.fixedVolume, this->Values.align, progress);
+  echorama::AlignVolumesParameters parameters = this->Values.align;
+  parameters.shared = &shared;
+  echorama::AlignVolumesResult found = echorama::AlignVolumesOnDemand(demanded, this->Values.fixedVolume, parameters, progress);
 
   // 3. the same voxels there
   for (std::size_t i = 0; i < volumes.size(); ++i) {

@@ -29,7 +29,8 @@
  * Landmarks that volumes carry (vtkUltrasoundLandmarks) count as those that are given here.
  *
  * Fails with a message when there are fewer than two volumes, or one is not three-dimensional, constant or nearly empty.
- * The whole of every volume is needed: under MPI each rank computes and holds the whole result.
+ * The whole of every volume is needed: each rank of Controller holds all of them, aligns its share of the pairs and gets the
+ * whole result, the same as one rank's. What fails on one rank fails on all, with its message.
  *
  * @sa vtkUltrasoundAlignmentScore, vtkUltrasoundLandmarkError, vtkUltrasoundLandmarks
  */
@@ -46,6 +47,7 @@
 #endif
 
 class vtkMatrix4x4;
+class vtkMultiProcessController;
 
 class ECHORAMAFILTERSREGISTRATION_EXPORT vtkUltrasoundAligner : public vtkUltrasoundMultiBlockAlgorithm {
 public:
@@ -174,6 +176,15 @@ public:
   void ClearLandmarks();
   ///@}
 
+  ///@{
+  /**
+   * Whose ranks share the pairs; all of them have to update. nullptr: this process aligns all by itself. Default: the global
+   * controller.
+   */
+  void SetController(vtkMultiProcessController* controller);
+  vtkMultiProcessController* GetController() const { return this->Controller; }
+  ///@}
+
   /** How many volumes the last update aligned; 0 when it failed. */
   int GetNumberOfVolumes() const;
 
@@ -209,14 +220,15 @@ public:
    * "overlap", "centre", "covariance"}, ...], "pairs": [{"fixed", "moving" (from 0), "verdict", "reason", "score", "similarity",
    * "overlap", "peak_ratio", "split_mm", "error_mm", "voted_down", "stands", "attempts", "residual_mm", "anywhere", "seconds":
    * {"global", "local", "confidence"}}, ...], "seconds": {"prepare", "pairs", "graph"}, "pairs_finished_before",
-   * "times_prepared", "prepared_bytes"}. Empty when it failed.
+   * "times_prepared", "prepared_bytes", "ranks", "messages", "message_bytes"}: these two are what this rank has sent to others,
+   * each by itself. Empty when it failed.
    */
   std::string GetReport() const;
 
   /**
-   * After a dry run what would be done, as JSON: {"pairs": [[fixed, moving (from 0)], ...], "pairs_finished_before",
-   * "times_prepared", "bytes_per_volume", "bytes_of_all", "budget_bytes", "seconds_per_pair", "seconds_per_volume", "seconds"}.
-   * Pairs that are tried again come on top of it. Otherwise empty.
+   * After a dry run what one rank would do, on the first rank, as JSON: {"pairs": [[fixed, moving (from 0)], ...],
+   * "pairs_finished_before", "times_prepared", "bytes_per_volume", "bytes_of_all", "budget_bytes", "seconds_per_pair",
+   * "seconds_per_volume", "seconds"}. Pairs that are tried again come on top of it. Otherwise empty.
    */
   std::string GetPlan() const;
 
@@ -259,6 +271,8 @@ private:
 
 #ifndef __VTK_WRAP__
   const echorama::VolumeAlignment* ResultOf(int volume) const;
+  void Align(vtkInformationVector** inputs, vtkInformationVector* outputs, echorama::SharedWork& shared,
+             const echorama::Progress& progress);
 
   struct Settings {
     int fixedVolume = 0;
@@ -266,6 +280,7 @@ private:
     echorama::AlignVolumesParameters align;
   };
   Settings Values;
+  vtkMultiProcessController* Controller = nullptr;
   echorama::LandmarkInput Landmarks;
   echorama::AlignVolumesResult Found;
   echorama::AlignVolumesPlan Planned;
