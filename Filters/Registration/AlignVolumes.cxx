@@ -67,7 +67,8 @@ void AlignVolumesRun::Outline(int v, const Progress& progress)
     }
   };
   try {
-    if (finished_.Empty() && shared_.Ranks() == 1 && prepared_.HasRoom()) {
+    const bool mayBeKnown = shared_.Ranks() == 1 ? !finished_.Empty() : !p_.resources.finishedPairs.empty();
+    if (!mayBeKnown && prepared_.HasRoom()) {
       outlines_.emplace_back(prepared_.Get(v, progress)->placed);
       return;
     }

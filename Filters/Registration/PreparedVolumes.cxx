@@ -132,7 +132,7 @@ std::vector<std::pair<int, int>> OrderedForReuse(std::vector<std::pair<int, int>
   std::map<int, std::size_t> place;
   for (const auto& [volume, others] : neighbours)
     if (place.count(volume) == 0) { // a part of its own; the last that is reached from anywhere lies at its rim
-      const int rim = Outwards(neighbours, Outwards(neighbours, volume).back()).back();
+      const int end = Outwards(neighbours, volume).back(), rim = std::min(end, Outwards(neighbours, end).back());
       for (const int v : Outwards(neighbours, rim))
         place.emplace(v, place.size());
     }
