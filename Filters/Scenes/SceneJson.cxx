@@ -27,12 +27,14 @@ nlohmann::ordered_json ToJson(const SceneScan& scan)
   return told;
 }
 
-std::string ReportOf(const std::vector<const SceneScan*>& scans)
+std::string ReportOf(const std::vector<const SceneScan*>& scans, int ranks, const Traffic& told)
 {
   nlohmann::ordered_json volumes = nlohmann::ordered_json::array();
   for (const SceneScan* scan : scans)
     volumes.push_back(ToJson(*scan));
-  return nlohmann::ordered_json{{"volumes", std::move(volumes)}}.dump();
+  return nlohmann::ordered_json{
+      {"volumes", std::move(volumes)}, {"ranks", ranks}, {"messages", told.messages}, {"message_bytes", told.bytesSent}}
+      .dump();
 }
 
 } // namespace echorama

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Base/Json.h"
+#include "Core/Sharing/SharedWork.h"
 #include "SceneRun.h"
 
 namespace echorama {
@@ -11,7 +12,7 @@ namespace echorama {
 /// press or gel where the scene has none.
 nlohmann::ordered_json ToJson(const SceneScan& scan);
 
-/// {"volumes": [...]} of several.
-std::string ReportOf(const std::vector<const SceneScan*>& scans);
+/// {"volumes": [...], "ranks", "messages", "message_bytes"} of several.
+std::string ReportOf(const std::vector<const SceneScan*>& scans, int ranks, const Traffic& told);
 
 } // namespace echorama

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundSceneSource.h"
 
+#include "Core/Base/Checksum.h"
 #include "Core/Base/JoinedText.h"
 #include "Core/Base/TextFile.h"
 #include "Core/Imaging/ScanConversion.h"
 #include "Core/Imaging/ValidPoints.h"
+#include "Core/Sharing/ControllerWork.h"
+#include "Core/Sharing/ShareOut.h"
 #include "Filters/Phantoms/PhantomViews.h"
 #include "SceneJson.h"
 #include "vtkCellArray.h"
@@ -15,19 +18,25 @@
 #include "vtkInformationVector.h"
 #include "vtkMatrix4x4.h"
 #include "vtkMultiBlockDataSet.h"
+#include "vtkMultiProcessController.h"
 #include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
 #include "vtkPoints.h"
 #include "vtkPolyData.h"
+#include "vtkSmartPointer.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkStringArray.h"
 #include "vtkUltrasoundAcquisition.h"
 #include "vtkUltrasoundGel.h"
 #include "vtkUltrasoundMeshFile.h"
+#include "vtkUltrasoundMessage.h"
 #include "vtkUltrasoundSynthesizer.h"
 #include "vtkUltrasoundTissue.h"
 #include "vtkUltrasoundTissuePress.h"
 #include "vtkUltrasoundVolume.h"
+
+#include <algorithm>
 
 using echorama::Error;
 
@@ -65,6 +74,54 @@ void FillLandmarks(vtkPolyData* data, const std::vector<echorama::Landmark>& lan
   data->GetPointData()->AddArray(labels);
 }
 
+// A view as another rank gets it.
+struct SentView {
+  vtkSmartPointer<vtkMultiBlockDataSet> blocks; // its block of each port but the tissue
+  vtkUltrasoundSceneSource::MadeView made;
+};
+
+template <class Bytes, class Scan>
+void PackOrUnpackReport(Bytes& bytes, Scan& scan)
+{
+  auto& c = scan.cost;
+  bytes(c.raysSeconds, c.scatterersSeconds, c.echoesSeconds, c.detectionSeconds, c.rays, c.segments, c.surfaceEchoes,
+        c.scatterers, c.bytes, scan.pressSeconds, scan.gelSeconds);
+  if (scan.pressed) {
+    bytes(scan.pressed->forceN, scan.pressed->relativeVolume, scan.pressed->leastVolume);
+  }
+  if (scan.gel) {
+    bytes(scan.gel->coupled, scan.gel->volumeMm3);
+  }
+  for (auto& landmark : scan.landmarks) {
+    bytes(landmark.label, landmark.position);
+  }
+}
+
+void Pack(echorama::Packed& to, const SentView& view)
+{
+  const echorama::SceneScan& scan = view.made.Scan;
+  vtkUltrasoundMessage::Pack(to, view.blocks);
+  to(view.made.Number, view.made.Knock, scan.pressed.has_value(), scan.gel.has_value(), scan.landmarks.size());
+  PackOrUnpackReport(to, scan);
+}
+
+void Unpack(echorama::Unpacked& from, SentView& view)
+{
+  view.blocks = vtkMultiBlockDataSet::SafeDownCast(vtkUltrasoundMessage::Unpack(from));
+  bool isPressed = false, hasGel = false;
+  std::size_t landmarks = 0;
+  echorama::SceneScan& scan = view.made.Scan;
+  from(view.made.Number, view.made.Knock, isPressed, hasGel, landmarks);
+  if (isPressed) {
+    scan.pressed.emplace();
+  }
+  if (hasGel) {
+    scan.gel.emplace();
+  }
+  scan.landmarks.resize(landmarks);
+  PackOrUnpackReport(from, scan);
+}
+
 } // namespace
 
 //----------------------------------------------------------------------------
@@ -72,10 +129,20 @@ vtkUltrasoundSceneSource::vtkUltrasoundSceneSource()
 {
   this->SetNumberOfInputPorts(0);
   this->SetNumberOfOutputPorts(4);
+  this->SetController(vtkMultiProcessController::GetGlobalController());
 }
 
 //----------------------------------------------------------------------------
-vtkUltrasoundSceneSource::~vtkUltrasoundSceneSource() = default;
+vtkUltrasoundSceneSource::~vtkUltrasoundSceneSource()
+{
+  this->SetController(nullptr);
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundSceneSource::SetController(vtkMultiProcessController* controller)
+{
+  vtkSetObjectBodyMacro(Controller, vtkMultiProcessController, controller);
+}
 
 //----------------------------------------------------------------------------
 echorama::ParameterList vtkUltrasoundSceneSource::Parameters()
@@ -140,32 +207,91 @@ echorama::SceneRun& vtkUltrasoundSceneSource::Prepare(const echorama::Progress& 
 }
 
 //----------------------------------------------------------------------------
+int vtkUltrasoundSceneSource::RequestInformation(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
+{
+  // Without this, ranks other than the first would not be asked for anything.
+  for (int port = 0; port < this->GetNumberOfOutputPorts(); ++port) {
+    outputs->GetInformationObject(port)->Set(CAN_HANDLE_PIECE_REQUEST(), 1);
+  }
+  return 1;
+}
+
+//----------------------------------------------------------------------------
 int vtkUltrasoundSceneSource::RequestData(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs)
 {
   return vtkUltrasoundVolume::Run(this, outputs, [this, outputs](const echorama::Progress& progress) {
     this->Made.clear();
-    echorama::SceneRun& run = this->Prepare(progress.Part(0.0, 0.1));
-    vtkUltrasoundTissue::Set(vtkPolyData::GetData(outputs, Tissue), run.Tissue());
-    const int views = static_cast<int>(run.Views().size()), only = this->Values.view;
-    if (only > views) {
-      throw Error(Error::Kind::InvalidParameter,
-                  "View is " + std::to_string(only) + "; the scene has " + std::to_string(views) + " views");
-    }
-    const int first = only > 0 ? only : 1, last = only > 0 ? only : views;
-    for (int number = first; number <= last; ++number) {
-      const auto at = [&](double part) { return 0.1 + 0.9 * (number - first + part) / (last - first + 1); };
-      echorama::SceneScan scan = run.Make(static_cast<std::size_t>(number) - 1, progress.Part(at(0.0), at(0.95)));
-      this->Put(scan, number, static_cast<unsigned int>(number - first), outputs, progress.Part(at(0.95), at(1.0)));
-      scan.beams = {};
-      scan.tissue = scan.gelSurface = {};
-      this->Made.back().Scan = std::move(scan);
-    }
+    this->Notes.clear();
+    echorama::ControllerWork<vtkMultiProcessController> shared(this->Controller);
+    shared.Run([&] { this->MakeViews(outputs, shared, progress); });
+    this->Ranks = shared.Ranks();
+    this->Told = shared.Told();
   });
 }
 
 //----------------------------------------------------------------------------
-void vtkUltrasoundSceneSource::Put(echorama::SceneScan& scan, int number, unsigned int block, vtkInformationVector* outputs,
-                                   const echorama::Progress& progress)
+void vtkUltrasoundSceneSource::MakeViews(vtkInformationVector* outputs, echorama::SharedWork& shared,
+                                         const echorama::Progress& progress)
+{
+  echorama::SceneRun& run = this->Prepare(progress.Part(0.0, 0.1));
+  vtkUltrasoundTissue::Set(vtkPolyData::GetData(outputs, Tissue), run.Tissue());
+  const int views = static_cast<int>(run.Views().size()), only = this->Values.view;
+  if (only > views) {
+    throw Error(Error::Kind::InvalidParameter,
+                "View is " + std::to_string(only) + "; the scene has " + std::to_string(views) + " views");
+  }
+  const int first = only > 0 ? only : 1;
+  const std::size_t count = only > 0 ? 1 : static_cast<std::size_t>(views);
+  const auto forEachPort = [outputs](const auto& visit) {
+    unsigned int place = 0;
+    for (const int port : {Volumes, Beams, Truth}) {
+      visit(vtkMultiBlockDataSet::GetData(outputs, port), place++);
+    }
+  };
+  const auto make = [&](std::size_t i, double begin, double end) {
+    const auto at = [&](double part) { return 0.1 + 0.9 * (begin + (end - begin) * part); };
+    const int number = first + static_cast<int>(i);
+    const auto block = static_cast<unsigned int>(i);
+    echorama::SceneScan scan = run.Make(static_cast<std::size_t>(number) - 1, progress.Part(at(0.0), at(0.95)));
+    SentView view{vtkSmartPointer<vtkMultiBlockDataSet>::New(), {}};
+    view.made = this->Put(scan, number, block, outputs, progress.Part(at(0.95), at(1.0)));
+    forEachPort([&](vtkMultiBlockDataSet* blocks, unsigned int place) {
+      PutBlock(view.blocks, place, blocks->GetBlock(block), blocks->GetMetaData(block)->Get(vtkCompositeDataSet::NAME()));
+    });
+    scan.beams = {};
+    scan.tissue = scan.gelSurface = {};
+    view.made.Scan = std::move(scan);
+    return view;
+  };
+  const auto hear = [&](std::size_t i, const SentView& view) {
+    forEachPort([&](vtkMultiBlockDataSet* blocks, unsigned int place) {
+      PutBlock(blocks, static_cast<unsigned int>(i), view.blocks->GetBlock(place),
+               view.blocks->GetMetaData(place)->Get(vtkCompositeDataSet::NAME()));
+    });
+  };
+  const std::string about = std::to_string(count) + " views " + echorama::Checksum(this->RunOf.data(), this->RunOf.size());
+  for (SentView& view : echorama::ShareOut<SentView>(shared, count, 1, about, make, hear)) {
+    this->Made.push_back(std::move(view.made));
+  }
+  echorama::Packed notes;
+  for (const std::string& note : run.Notes()) {
+    notes(note);
+  }
+  for (const std::string& told : shared.Exchange(notes.Bytes())) {
+    for (echorama::Unpacked from(told); !from.AtEnd();) {
+      std::string note;
+      from(note);
+      if (std::find(this->Notes.begin(), this->Notes.end(), note) == this->Notes.end()) {
+        this->Notes.push_back(note);
+      }
+    }
+  }
+}
+
+//----------------------------------------------------------------------------
+vtkUltrasoundSceneSource::MadeView vtkUltrasoundSceneSource::Put(echorama::SceneScan& scan, int number, unsigned int block,
+                                                                 vtkInformationVector* outputs,
+                                                                 const echorama::Progress& progress)
 {
   const echorama::SynthesisScene& scene = this->Run->Scene();
   const echorama::SynthesisParameters& p = scan.parameters;
@@ -207,7 +333,7 @@ void vtkUltrasoundSceneSource::Put(echorama::SceneScan& scan, int number, unsign
     put(landmarks, "landmarks");
   }
   PutBlock(vtkMultiBlockDataSet::GetData(outputs, Truth), block, truth, "view_" + suffix);
-  this->Made.push_back(std::move(made));
+  return made;
 }
 
 //----------------------------------------------------------------------------
@@ -270,7 +396,7 @@ std::string vtkUltrasoundSceneSource::GetResolvedScene()
 std::string vtkUltrasoundSceneSource::GetNotes()
 {
   std::string text;
-  for (const std::string& note : this->Run ? this->Run->Notes() : std::vector<std::string>()) {
+  for (const std::string& note : this->Notes) {
     text += note + "\n";
   }
   return text;
@@ -283,7 +409,7 @@ std::string vtkUltrasoundSceneSource::GetReport()
   for (const MadeView& made : this->Made) {
     scans.push_back(&made.Scan);
   }
-  return echorama::ReportOf(scans);
+  return echorama::ReportOf(scans, this->Ranks, this->Told);
 }
 
 //----------------------------------------------------------------------------

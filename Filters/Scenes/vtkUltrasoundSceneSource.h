@@ -23,6 +23,9 @@
  *
  * The scene is kept, so that one view after another costs no more than all at once; a file that has changed is read again.
  *
+ * Each rank of Controller makes its share of the views, whole ones, and gets all of them: the same as one rank makes. What fails
+ * on one rank fails on all, with its message.
+ *
  * Fails, with a message that gives the way to the key, for what is no scene, for files that it names and that cannot be read,
  * for a view that there is not, and for what a probe cannot do.
  *
@@ -37,6 +40,7 @@
 #include <string> // for reports
 
 #ifndef __VTK_WRAP__
+#include "Core/Sharing/SharedWork.h"
 #include "Filters/Scenes/SceneRun.h"
 #include <memory>
 #include <vector>
@@ -44,6 +48,7 @@
 
 class vtkImageData;
 class vtkMatrix4x4;
+class vtkMultiProcessController;
 
 class ECHORAMAFILTERSSCENES_EXPORT vtkUltrasoundSceneSource : public vtkMultiBlockDataSetAlgorithm {
 public:
@@ -82,6 +87,15 @@ public:
   vtkUltrasoundAnyParameterMacro();
   // END parameters
 
+  ///@{
+  /**
+   * Whose ranks share the views; all of them have to update. nullptr: this process makes all by itself. Default: the global
+   * controller.
+   */
+  void SetController(vtkMultiProcessController* controller);
+  vtkMultiProcessController* GetController() const { return this->Controller; }
+  ///@}
+
   /** How many views the scene has; 0, after an error event, for what is no scene. */
   int GetNumberOfViews();
 
@@ -97,7 +111,10 @@ public:
   /** What there is to say about the scene and the last update, a line each; never fatal. */
   std::string GetNotes();
 
-  /** What was made by the last update, as JSON: {"volumes": [{"press", "gel", "cost"}, ...]}. */
+  /**
+   * What was made by the last update, as JSON: {"volumes": [{"press", "gel", "cost"}, ...], "ranks", "messages",
+   * "message_bytes"}: these two are what this rank has sent to others, each by itself.
+   */
   std::string GetReport();
 
   /** The JSON schema of scenes, the text of Examples/scenes/echorama-scene-1.schema.json. */
@@ -106,7 +123,7 @@ public:
 #ifndef __VTK_WRAP__
   echorama::ParameterList Parameters(); ///< for C++: they point into this object
 
-  /** A view of the last update; of the scan without what the outputs hold. */
+  /** A view of the last update; of the scan without what the outputs hold, and of what another rank made what reports tell. */
   struct MadeView {
     int Number = 0; ///< from 1
     echorama::Pose Knock = echorama::Pose::Identity();
@@ -126,6 +143,7 @@ protected:
   ~vtkUltrasoundSceneSource() override;
 
   int FillOutputPortInformation(int port, vtkInformation* info) override;
+  int RequestInformation(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs) override;
   int RequestData(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs) override;
 
 private:
@@ -141,11 +159,16 @@ private:
   };
   echorama::SynthesisScene Read() const;
   echorama::SceneRun& Prepare(const echorama::Progress& progress);
-  void Put(echorama::SceneScan& scan, int number, unsigned int block, vtkInformationVector* outputs,
-           const echorama::Progress& progress);
+  void MakeViews(vtkInformationVector* outputs, echorama::SharedWork& shared, const echorama::Progress& progress);
+  MadeView Put(echorama::SceneScan& scan, int number, unsigned int block, vtkInformationVector* outputs,
+               const echorama::Progress& progress);
 
   Settings Values;
+  vtkMultiProcessController* Controller = nullptr;
   std::vector<MadeView> Made;
+  std::vector<std::string> Notes;
+  int Ranks = 1;
+  echorama::Traffic Told; ///< by this rank, in the last update
   std::unique_ptr<echorama::SceneRun> Run;
   std::string RunOf; ///< the scene, and what else the run was made with
 #endif

@@ -71,7 +71,8 @@ def synthesizing(scene=str(pathlib.Path(__file__).parents[2] / "Examples/scenes/
     source = vtkUltrasoundSceneSource()
     source.SetFileName(scene)
     yield source
-    yield {"views": source.GetNumberOfViews(), "messages": source.GetNumberOfMessages(), "message_bytes": source.GetMessageBytes()}
+    report = json.loads(source.GetReport())
+    yield {"views": len(report["volumes"]), **{key: report[key] for key in ("messages", "message_bytes")}}
 
 
 def checksum(data, digest=None):

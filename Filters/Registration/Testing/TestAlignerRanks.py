@@ -7,45 +7,24 @@ import json
 import math
 import os
 import shutil
-import subprocess
-import sys
-import tempfile
 import unittest
 
-SPAWNED = "ECHORAMA_RANKS_CASES" in os.environ
+import numpy as np
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkCommonDataModel import vtkImageData
 
-
-def start(cases, ranks, folder):
-    environment = dict(os.environ, ECHORAMA_RANKS_CASES=cases, ECHORAMA_RANKS_FOLDER=folder, OMPI_ALLOW_RUN_AS_ROOT="1",
-                       OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1", OMPI_MCA_rmaps_base_oversubscribe="1",
-                       PRTE_MCA_rmaps_default_mapping_policy=":oversubscribe")
-    command = ["mpiexec", "-n", str(ranks), "/usr/bin/python3", os.path.abspath(__file__)]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
-
-
-def results(folder, ranks):
-    found = []
-    for rank in range(ranks):
-        with open(f"{folder}/{rank}.json", encoding="utf-8") as file:
-            found.append(json.load(file))
-    return found
+import mpi_ranks
+from echorama.EchoramaFiltersRegistration import vtkUltrasoundAligner
 
 
 @unittest.skipUnless(shutil.which("mpiexec"), "mpiexec is not installed")
 class Ranks(unittest.TestCase):
-    def run_cases(self, cases, ranks):
-        """What each rank tells of each case."""
-        with tempfile.TemporaryDirectory() as folder:
-            run = start(cases, ranks, folder)
-            self.assertEqual(run.returncode, 0, run.stdout + run.stderr)
-            return results(folder, ranks)
-
     def test_same_as_one_rank(self):
-        one = self.run_cases("align", 1)[0]["align"]
+        one = mpi_ranks.told(self, __file__, ["align"], 1)[0]["align"]
         self.assertEqual((one["ranks"], one["messages"], one["message_bytes"]), (1, 0, 0))
         self.assertGreaterEqual(one["verdicts"].count("aligned"), 5)
         for ranks in (2, 4, 8):
-            found = [rank["align"] for rank in self.run_cases("align", ranks)]
+            found = [rank["align"] for rank in mpi_ranks.told(self, __file__, ["align"], ranks)]
             for rank in found:
                 self.assertEqual(rank["made"], one["made"], f"{ranks} ranks")
                 self.assertEqual(rank["ranks"], ranks)
@@ -61,7 +40,7 @@ class Ranks(unittest.TestCase):
         # One after the other: what failed leaves nothing behind.
         messages = {"bad volume": "rank 1: volume 3: ", "wrong parameter": "the fixed volume must be one of the 6",
                     "other parameter": "the ranks do not work on the same"}
-        for told in self.run_cases(",".join([*messages, "stop", "by itself", "align"]), 2):
+        for told in mpi_ranks.told(self, __file__, [*messages, "stop", "by itself", "align"], 2):
             for case, message in messages.items():
                 self.assertEqual(told[case]["volumes"], 0)
                 self.assertEqual(len(told[case]["errors"]), 1, told[case])
@@ -72,103 +51,76 @@ class Ranks(unittest.TestCase):
             self.assertEqual(told["align"]["ranks"], 2)
 
     def test_a_rank_that_dies_ends_all(self):
-        with tempfile.TemporaryDirectory() as folder:
-            run = start("die", 2, folder)
-            self.assertNotEqual(run.returncode, 0)
-            self.assertEqual(os.listdir(folder), [])
+        done, told = mpi_ranks.run(__file__, ["die"], 2)
+        self.assertNotEqual(done.returncode, 0)
+        self.assertEqual(told, [])
 
 
-def rank_main(cases, folder):
-    import mpi4py.MPI  # begins MPI
-    import numpy as np
-    from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-    from vtkmodules.vtkCommonCore import vtkCommand
-    from vtkmodules.vtkCommonDataModel import vtkImageData
-    from vtkmodules.vtkParallelCore import vtkMultiProcessController
-    from vtkmodules.vtkParallelMPI import vtkMPIController
-
-    from echorama.EchoramaFiltersRegistration import vtkUltrasoundAligner
-
-    controller = vtkMPIController()
-    controller.Initialize()
-    vtkMultiProcessController.SetGlobalController(controller)
-    rank = controller.GetLocalProcessId()
-
-    rng = np.random.default_rng(4)
-    knocks = rng.uniform(-2, 2, (6, 3))
-    waves = rng.normal(size=(24, 3)) * 0.12
-    phases = rng.uniform(0, 2 * math.pi, 24)
-
-    def volume(origin, knock):
-        """What a grid sees of one smooth scene; it is told to lie elsewhere."""
-        dims = (28, 26, 24)
-        image = vtkImageData()
-        image.SetDimensions(dims)
-        image.SetSpacing(2, 2, 2)
-        image.SetOrigin(np.add(origin, knock))
-        k, j, i = np.meshgrid(*[2.0 * np.arange(n) for n in dims[::-1]], indexing="ij")
-        scene = (120 + 9 * np.cos((np.stack([i, j, k], -1) + origin) @ waves.T + phases).sum(-1)).clip(1, 254)
-        array = numpy_to_vtk(scene.astype(np.uint8).ravel(), deep=True)
-        array.SetName("Intensity")
-        image.GetPointData().SetScalars(array)
-        return image
-
-    def align(case):
-        aligner = vtkUltrasoundAligner()
-        aligner.SetStart("tracked")
-        aligner.SetCandidates(4)
-        aligner.SetPoints(4000)
-        count = 2 if case == "by itself" else 6
-        for v in range(count):
-            image = volume((14.0 * v, 3.0 * (v % 2), 0.0), (0, 0, 0) if v == 0 else knocks[v])
-            if case == "bad volume" and rank == 1 and v == 2:
-                image.GetPointData().Initialize()
-            aligner.AddInputDataObject(image)
-        errors = []
-
-        def note(caller, event, text):
-            errors.append(text)
-
-        note.CallDataType = "string0"
-        aligner.AddObserver(vtkCommand.ErrorEvent, note)
-        if case == "wrong parameter":
-            aligner.SetFixedVolume(9)
-        if case == "other parameter":
-            aligner.SetMinimumSimilarity(0.06 + 0.01 * rank)
-        if case == "by itself":
-            aligner.SetController(None)
-        if case == "stop" and rank == 1:
-            aligner.AddObserver(vtkCommand.ProgressEvent, lambda caller, event: caller.SetAbortExecute(caller.GetProgress() > 0.3))
-        if case == "die" and rank == 1:
-            aligner.AddObserver(vtkCommand.ProgressEvent, lambda caller, event: caller.GetProgress() < 0.3 or os._exit(3))
-        aligner.Update()
-        told = {"volumes": aligner.GetNumberOfVolumes(), "errors": errors}
-        if told["volumes"]:
-            report = json.loads(aligner.GetReport())
-            digest = hashlib.sha256()
-            output = aligner.GetOutput()
-            for v in range(told["volumes"]):
-                block = output.GetBlock(v)
-                d = block.GetDirectionMatrix()
-                digest.update(np.array([*block.GetOrigin(), *(d.GetElement(r, c) for r in range(3) for c in range(3))]).tobytes())
-                fields = block.GetFieldData()
-                for name in ("VolumeToWorld", "AlignmentSimilarity", "AlignmentCovariance", "AlignmentCentre"):
-                    digest.update(vtk_to_numpy(fields.GetArray(name)).tobytes())
-            for pair in report["pairs"]:
-                digest.update(json.dumps({key: value for key, value in pair.items() if key != "seconds"}).encode())
-            told.update({key: report[key] for key in ("ranks", "messages", "message_bytes")}, made=digest.hexdigest(),
-                        pairs=len(report["pairs"]), tries=sum(pair["attempts"] for pair in report["pairs"]),
-                        verdicts=[each["verdict"] for each in report["volumes"]])
-        return told
-
-    told = {case: align(case) for case in cases}
-    with open(f"{folder}/{rank}.json", "w", encoding="utf-8") as file:
-        json.dump(told, file)
-    vtkMultiProcessController.SetGlobalController(None)
+rng = np.random.default_rng(4)
+knocks = rng.uniform(-2, 2, (6, 3))
+waves = rng.normal(size=(24, 3)) * 0.12
+phases = rng.uniform(0, 2 * math.pi, 24)
 
 
-if SPAWNED:
-    rank_main(os.environ["ECHORAMA_RANKS_CASES"].split(","), os.environ["ECHORAMA_RANKS_FOLDER"])
-    sys.exit(0)
+def volume(origin, knock):
+    """What a grid sees of one smooth scene; it is told to lie elsewhere."""
+    dims = (28, 26, 24)
+    image = vtkImageData()
+    image.SetDimensions(dims)
+    image.SetSpacing(2, 2, 2)
+    image.SetOrigin(np.add(origin, knock))
+    k, j, i = np.meshgrid(*[2.0 * np.arange(n) for n in dims[::-1]], indexing="ij")
+    scene = (120 + 9 * np.cos((np.stack([i, j, k], -1) + origin) @ waves.T + phases).sum(-1)).clip(1, 254)
+    array = numpy_to_vtk(scene.astype(np.uint8).ravel(), deep=True)
+    array.SetName("Intensity")
+    image.GetPointData().SetScalars(array)
+    return image
+
+
+def align(case, rank):
+    aligner = vtkUltrasoundAligner()
+    aligner.SetStart("tracked")
+    aligner.SetCandidates(4)
+    aligner.SetPoints(4000)
+    count = 2 if case == "by itself" else 6
+    for v in range(count):
+        image = volume((14.0 * v, 3.0 * (v % 2), 0.0), (0, 0, 0) if v == 0 else knocks[v])
+        if case == "bad volume" and rank == 1 and v == 2:
+            image.GetPointData().Initialize()
+        aligner.AddInputDataObject(image)
+    errors = mpi_ranks.errors_of(aligner)
+    if case == "wrong parameter":
+        aligner.SetFixedVolume(9)
+    if case == "other parameter":
+        aligner.SetMinimumSimilarity(0.06 + 0.01 * rank)
+    if case == "by itself":
+        aligner.SetController(None)
+    if case == "stop" and rank == 1:
+        aligner.AddObserver("ProgressEvent", lambda caller, event: caller.SetAbortExecute(caller.GetProgress() > 0.3))
+    if case == "die" and rank == 1:
+        aligner.AddObserver("ProgressEvent", lambda caller, event: caller.GetProgress() < 0.3 or os._exit(3))
+    aligner.Update()
+    told = {"volumes": aligner.GetNumberOfVolumes(), "errors": errors}
+    if told["volumes"]:
+        report = json.loads(aligner.GetReport())
+        digest = hashlib.sha256()
+        output = aligner.GetOutput()
+        for v in range(told["volumes"]):
+            block = output.GetBlock(v)
+            d = block.GetDirectionMatrix()
+            digest.update(np.array([*block.GetOrigin(), *(d.GetElement(r, c) for r in range(3) for c in range(3))]).tobytes())
+            fields = block.GetFieldData()
+            for name in ("VolumeToWorld", "AlignmentSimilarity", "AlignmentCovariance", "AlignmentCentre"):
+                digest.update(vtk_to_numpy(fields.GetArray(name)).tobytes())
+        for pair in report["pairs"]:
+            digest.update(json.dumps({key: value for key, value in pair.items() if key != "seconds"}).encode())
+        told.update({key: report[key] for key in ("ranks", "messages", "message_bytes")}, made=digest.hexdigest(),
+                    pairs=len(report["pairs"]), tries=sum(pair["attempts"] for pair in report["pairs"]),
+                    verdicts=[each["verdict"] for each in report["volumes"]])
+    return told
+
+
+if mpi_ranks.is_rank():
+    mpi_ranks.tell(align)
 if __name__ == "__main__":
     unittest.main()
