@@ -270,7 +270,7 @@ void vtkUltrasoundSceneSource::MakeViews(vtkInformationVector* outputs, echorama
     });
   };
   const std::string about = std::to_string(count) + " views " + echorama::Checksum(this->RunOf.data(), this->RunOf.size());
-  for (SentView& view : echorama::ShareOut<SentView>(shared, count, 1, about, make, hear)) {
+  for (SentView& view : echorama::ShareOut<SentView>(shared, count, count, about, make, hear)) {
     this->Made.push_back(std::move(view.made));
   }
   echorama::Packed notes;
