@@ -176,7 +176,7 @@ void RowSampler<T>::Narrow(double margin, Line& line) const
     const double low = -margin - line.start[axis], high = intensity_.Dimensions()[axis] - 1 + margin - line.start[axis];
     if (line.step[axis] == 0.0) {
       if (!(low <= 0.0 && high > 0.0))
-        end = begin;
+        end = line.begin; // nowhere; begin may lie beyond the end already
       continue;
     }
     const double a = low / line.step[axis], b = high / line.step[axis];

@@ -130,6 +130,35 @@ TEST(RowSampler, LongRows)
   }
 }
 
+TEST(RowSampler, TurnedAboutAnAxisOfTheGridNothingIsWrittenBesideTheRow)
+{
+  // In the last slice no voxel has a neighbour along z, and rows at the corners of the box hardly meet the volume.
+  const std::array<int, 3> n{32, 32, 6};
+  const Volume<unsigned char> values(n, 1);
+  for (const double degrees : {-1.5, 0.7, 40.0}) {
+    ImageGeometry geometry = Grid(n, 1.0);
+    geometry.direction = Eigen::AngleAxisd(degrees * 3.14159265358979 / 180.0, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    ImageGeometry grid = Grid({80, 80, 8}, 1.0);
+    grid.origin = {-25.0, -25.0, 0.0};
+    const RowSampler<unsigned char> rows({values.View(), {}, geometry}, grid);
+    const GridBox& box = rows.Box();
+    constexpr std::size_t beside = 64;
+    const std::size_t width = static_cast<std::size_t>(box.size[0]);
+    for (int k = box.first[2]; k < box.first[2] + box.size[2]; ++k)
+      for (int j = box.first[1]; j < box.first[1] + box.size[1]; ++j) {
+        std::vector<unsigned char> inside(width + 2 * beside, 9), read = inside;
+        std::vector<float> found(width + 2 * beside, 9.0f);
+        rows.Inside(j, k, inside.data() + beside);
+        rows.Read(j, k, read.data() + beside, found.data() + beside);
+        ASSERT_EQ(read, inside) << degrees << " degrees, row " << j << " of slice " << k;
+        for (std::size_t i = 0; i < beside; ++i) {
+          ASSERT_EQ(inside[i] + inside[beside + width + i], 18);
+          ASSERT_EQ(found[i] + found[beside + width + i], 18.0f) << degrees << " degrees, row " << j << " of slice " << k;
+        }
+      }
+  }
+}
+
 TEST(RowSampler, ShiftedAlongItsOwnLattice)
 {
   Random random(4);
