@@ -72,7 +72,7 @@ void Smooth(Volume<float>& volume)
 }
 
 // Of where the volume is (bit 0), what it shares.
-ECHORAMA_HOT void KeepShared(const unsigned char* coverage, int count, unsigned char* inside)
+ECHORAMA_HOT void KeepShared(const unsigned char* coverage, int count, unsigned char* __restrict inside)
 {
   for (int i = 0; i < count; ++i)
     inside[i] &= coverage[i] > 1 ? 1 : 0;
@@ -109,7 +109,7 @@ BlockLattice BlocksOf(const ImageGeometry& grid, double scale)
   return blocks;
 }
 
-SmoothPart LowPass(const StitchSampler& volume, const BlockLattice& blocks, VolumeView<const unsigned char> coverage, int step,
+SmoothPart LowPass(const StitchSampler& volume, const BlockLattice& blocks, const CoverageMap& coverage, int step,
                    const Progress& progress, const Boxed<unsigned char>* mask)
 {
   const GridBox& own = volume.Box();
@@ -128,6 +128,9 @@ SmoothPart LowPass(const StitchSampler& volume, const BlockLattice& blocks, Volu
   ParallelRanges(rows, 1, progress, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     const std::size_t count = static_cast<std::size_t>(own.size[0]);
     std::vector<unsigned char> inside(count);
+    const auto column = [&](int i) { return std::min(i / step, coverage.Dimensions()[0] - 1); };
+    const int start = column(own.first[0]);
+    std::vector<unsigned char> covered(static_cast<std::size_t>(column(own.first[0] + own.size[0] - 1) - start + 1));
     std::vector<float> values(count);
     std::vector<double> sums(count), squares(count), counts(count); // of the columns of a row of blocks
     for (std::ptrdiff_t row = begin; row < end; ++row) {
@@ -142,17 +145,17 @@ SmoothPart LowPass(const StitchSampler& volume, const BlockLattice& blocks, Volu
       };
       for (int k = std::max(bk * blocks.size[2], own.first[2]); k < last(bk, 2); ++k)
         for (int j = std::max(bj * blocks.size[1], own.first[1]); j < last(bj, 1); ++j) {
-          const unsigned char* covered =
-              coverage.Row(std::min(j / step, coverage.Dimensions()[1] - 1), std::min(k / step, coverage.Dimensions()[2] - 1));
+          coverage.Copy(start, std::min(j / step, coverage.Dimensions()[1] - 1), std::min(k / step, coverage.Dimensions()[2] - 1),
+                        static_cast<int>(covered.size()), covered.data());
           if (mask)
             std::copy_n(mask->Row(j, k), count, inside.begin());
           else
             volume.Inside(j, k, inside.data());
           if (step == 1)
-            KeepShared(covered + own.first[0], own.size[0], inside.data());
+            KeepShared(covered.data(), own.size[0], inside.data());
           else
             for (int i = 0; i < own.size[0]; ++i)
-              inside[i] &= covered[std::min((own.first[0] + i) / step, coverage.Dimensions()[0] - 1)] > 1;
+              inside[i] &= covered[static_cast<std::size_t>(column(own.first[0] + i) - start)] > 1;
           if (!std::memchr(inside.data(), 1, count))
             continue;
           any = true;

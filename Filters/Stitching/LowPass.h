@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "CoverageMap.h"
 #include "StitchSampler.h"
 
 namespace echorama {
@@ -26,7 +27,7 @@ struct SmoothPart {
 /// of about the size of a block. A constant stays that constant, and has no deviation. Cost: the volume is sampled once in the
 /// overlap. \param coverage how many volumes cover every step-th voxel of the grid (Coarsened)
 /// \param mask where the volume is (bit 0), in its box, if that is known already
-SmoothPart LowPass(const StitchSampler& volume, const BlockLattice& blocks, VolumeView<const unsigned char> coverage, int step,
+SmoothPart LowPass(const StitchSampler& volume, const BlockLattice& blocks, const CoverageMap& coverage, int step,
                    const Progress& progress = {}, const Boxed<unsigned char>* mask = nullptr);
 
 } // namespace echorama

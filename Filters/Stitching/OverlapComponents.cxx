@@ -8,10 +8,9 @@
 
 namespace echorama {
 
-OverlapComponents::OverlapComponents(const RegionMap& regions, VolumeView<const unsigned char> coverage)
-  : rows_(coverage.Dimensions()[1])
+OverlapComponents::OverlapComponents(const RegionMap& regions) : rows_(regions.Coverage().Dimensions()[1])
 {
-  const auto& n = coverage.Dimensions();
+  const auto& n = regions.Coverage().Dimensions();
   std::vector<int> parents;
   const auto rootOf = [&parents](int piece) {
     while (parents[piece] != piece)
@@ -27,16 +26,18 @@ OverlapComponents::OverlapComponents(const RegionMap& regions, VolumeView<const 
   starts_.push_back(0);
   for (int k = 0; k < n[2]; ++k)
     for (int j = 0; j < n[1]; ++j) {
-      const unsigned char* covered = coverage.Row(j, k);
-      for (int i = 0; i < n[0]; ++i) {
-        if (covered[i] < 2)
-          continue;
-        const int begin = i;
-        while (i < n[0] && covered[i] > 1)
-          ++i;
-        runs_.push_back({begin, i, static_cast<int>(parents.size())});
-        parents.push_back(static_cast<int>(parents.size()));
-      }
+      regions.Coverage().ForRuns(j, k, [&](int first, int end, const unsigned char* counts) {
+        const unsigned char* const covered = counts - first;
+        for (int i = first; i < end; ++i) {
+          if (covered[i] < 2)
+            continue;
+          const int begin = i;
+          while (i < end && covered[i] > 1)
+            ++i;
+          runs_.push_back({begin, i, static_cast<int>(parents.size())});
+          parents.push_back(static_cast<int>(parents.size()));
+        }
+      });
       const std::size_t row = starts_.size() - 1;
       if (j > 0)
         join(row, row - 1);

@@ -11,8 +11,7 @@ namespace echorama {
 class OverlapComponents {
 public:
   OverlapComponents() = default;
-  /// After RegionMap::GiveCores. \param coverage the same that the map was made with
-  OverlapComponents(const RegionMap& regions, VolumeView<const unsigned char> coverage);
+  explicit OverlapComponents(const RegionMap& regions); ///< after RegionMap::GiveCores
 
   int Count() const { return static_cast<int>(first_.size()); }
 

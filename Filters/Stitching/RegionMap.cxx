@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // All regions follow from one number per voxel, how many volumes cover it, and one bit per volume: with c the coverage and
-// m the mask, pure is m and c = 1, overlap is m and c > 1, empty is not m and c > 0. So nothing else is stored.
+// m the mask, pure is m and c = 1, overlap is m and c > 1, empty is not m and c > 0. So nothing else is stored, and that only
+// where volumes are: a grid may be far larger than all of them.
 //
 // Distances are wanted in the overlap region of one volume only. Distance maps of the whole grid, two per volume, would
 // cost n times the grid; instead the map is made in the smallest box that certainly holds the nearest voxel of the region
@@ -12,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace echorama {
 
@@ -19,30 +21,52 @@ namespace {
 
 constexpr int blockSize = 4;
 
+std::vector<GridBox> BoxesOf(const std::vector<Boxed<unsigned char>>& masks)
+{
+  std::vector<GridBox> boxes;
+  for (const auto& mask : masks)
+    boxes.push_back(mask.box);
+  return boxes;
+}
+
+// A box and so many voxels around it, of a grid.
+GridBox Grown(const GridBox& box, const std::array<int, 3>& by, const std::array<int, 3>& grid)
+{
+  GridBox grown = box;
+  for (int axis = 0; axis < 3; ++axis) {
+    grown.first[axis] -= by[axis];
+    grown.size[axis] += 2 * by[axis];
+  }
+  return grown.Intersected({{0, 0, 0}, grid});
+}
+
 } // namespace
 
-RegionMap::RegionMap(std::vector<Boxed<unsigned char>> masks, const Eigen::Vector3d& spacing, VolumeView<unsigned char> coverage,
-                     const Progress& progress)
-  : masks_(std::move(masks)), counts_(masks_.size()), spacing_(spacing), coverage_(coverage)
+RegionMap::RegionMap(std::vector<Boxed<unsigned char>> masks, const std::array<int, 3>& dimensions,
+                     const Eigen::Vector3d& spacing, const Progress& progress)
+  : masks_(std::move(masks)), counts_(masks_.size()), spacing_(spacing), coverage_(dimensions, BoxesOf(masks_))
 {
-  const auto& n = coverage_.Dimensions();
-  const GridBox grid{{0, 0, 0}, n};
+  const auto& n = dimensions;
   // Pass 1: coverage, and how many overlap voxels each row has.
-  overlapBefore_.assign(static_cast<std::size_t>(n[1]) * n[2] + 1, 0);
-  ForRows(grid, progress.Part(0.0, 0.5), [&](int j, int k) {
-    unsigned char* covered = coverage_.Row(j, k);
-    std::fill_n(covered, n[0], static_cast<unsigned char>(0));
+  overlapBefore_.assign(static_cast<std::size_t>(n[1]) * static_cast<std::size_t>(n[2]) + 1, 0);
+  ForRows({{0, 0, 0}, n}, progress.Part(0.0, 0.5), [&](int j, int k) {
+    std::ptrdiff_t overlap = 0;
+    bool any = false;
+    coverage_.ForRuns(j, k, [&any](int, int, const unsigned char*) { any = true; });
+    if (!any)
+      return;
     for (const auto& mask : masks_)
       if (mask.box.HasRow(j, k)) {
         const unsigned char* inside = mask.Row(j, k);
-        unsigned char* from = covered + mask.box.first[0];
+        unsigned char* from = coverage_.At(mask.box.first[0], j, k);
         for (int i = 0; i < mask.box.size[0]; ++i)
           from[i] = static_cast<unsigned char>(from[i] + (inside[i] & (from[i] < 255)));
       }
-    std::ptrdiff_t overlap = 0;
-    for (int i = 0; i < n[0]; ++i)
-      overlap += covered[i] > 1;
-    overlapBefore_[static_cast<std::size_t>(k) * n[1] + j + 1] = overlap;
+    coverage_.ForRuns(j, k, [&overlap](int first, int end, const unsigned char* covered) {
+      for (int i = 0; i < end - first; ++i)
+        overlap += covered[i] > 1;
+    });
+    overlapBefore_[static_cast<std::size_t>(k) * static_cast<std::size_t>(n[1]) + static_cast<std::size_t>(j) + 1] = overlap;
   });
   for (std::size_t row = 1; row < overlapBefore_.size(); ++row)
     overlapBefore_[row] += overlapBefore_[row - 1];
@@ -54,7 +78,8 @@ RegionMap::RegionMap(std::vector<Boxed<unsigned char>> masks, const Eigen::Vecto
     for (int k = 0; k < mask.box.size[2]; ++k)
       for (int j = 0; j < mask.box.size[1]; ++j) {
         const unsigned char* inside = mask.values.View().Row(j, k);
-        const unsigned char* covered = coverage_.Row(j + mask.box.first[1], k + mask.box.first[2]) + mask.box.first[0];
+        const unsigned char* covered =
+            std::as_const(coverage_).At(mask.box.first[0], j + mask.box.first[1], k + mask.box.first[2]);
         std::ptrdiff_t all = 0, pure = 0;
         for (int i = 0; i < mask.box.size[0]; ++i) {
           all += inside[i];
@@ -69,28 +94,32 @@ RegionMap::RegionMap(std::vector<Boxed<unsigned char>> masks, const Eigen::Vecto
 std::ptrdiff_t RegionMap::OverlapBefore(int i, int j, int k) const
 {
   std::ptrdiff_t count = overlapBefore_[static_cast<std::size_t>(k) * coverage_.Dimensions()[1] + j];
-  const unsigned char* covered = coverage_.Row(j, k);
-  for (int x = 0; x < i; ++x)
-    count += covered[x] > 1;
+  coverage_.ForRuns(j, k, [&](int first, int end, const unsigned char* covered) {
+    for (int x = first; x < std::min(i, end); ++x)
+      count += covered[x - first] > 1;
+  });
   return count;
 }
 
 void RegionMap::RegionRow(Region region, int volume, int first, int j, int k, int count, unsigned char* out) const
 {
   const Boxed<unsigned char>& mask = masks_[volume];
-  const unsigned char* covered = coverage_.Row(j, k) + first;
   // The piece of the row that lies in the box of the volume.
   const GridBox row = GridBox{{first, j, k}, {count, 1, 1}}.Intersected(mask.box);
   const int begin = row.Empty() ? count : row.first[0] - first, end = row.Empty() ? count : begin + row.size[0];
   const unsigned char* inside = row.Empty() ? nullptr : mask.Row(j, k) + (row.first[0] - mask.box.first[0]) - begin;
   if (region == Region::Empty) {
+    coverage_.Copy(first, j, k, count, out);
     for (int i = 0; i < count; ++i)
-      out[i] = covered[i] > 0;
+      out[i] = out[i] > 0;
     for (int i = begin; i < end; ++i)
       out[i] = static_cast<unsigned char>(out[i] & ~inside[i]);
     return;
   }
   std::fill_n(out, count, static_cast<unsigned char>(0));
+  if (row.Empty())
+    return;
+  const unsigned char* covered = coverage_.At(row.first[0], j, k) - begin;
   if (region == Region::Overlap)
     for (int i = begin; i < end; ++i)
       out[i] = inside[i] & (covered[i] > 1);
@@ -104,9 +133,27 @@ void RegionMap::RegionRow(Region region, int volume, int first, int j, int k, in
 
 GridBox RegionMap::SearchBox(Region region, int volume, const Progress& progress) const
 {
-  // Pure regions lie in the volume's own box, empty ones anywhere.
-  const GridBox all{{0, 0, 0}, coverage_.Dimensions()};
-  const GridBox scan = region == Region::Empty ? all : Box(volume);
+  // Pure regions lie in the volume's own box, empty ones anywhere: they are looked for around it first, and farther away where
+  // one that is nearer than the nearest so far could lie beyond.
+  GridBox scan = Box(volume), found;
+  if (region != Region::Empty) {
+    SearchWithin(scan, region, volume, found, progress);
+    return found;
+  }
+  const std::array<int, 3>& grid = coverage_.Dimensions();
+  double done = 0.0;
+  for (int reach = 2 * blockSize;; reach *= 2) {
+    scan = Grown(scan, {reach, reach, reach}, grid);
+    const double next = 0.5 * (done + 1.0); // how many rounds there will be is not known
+    if (SearchWithin(scan, region, volume, found, progress.Part(done, next)) || scan.size == grid)
+      return found;
+    done = next;
+  }
+}
+
+// Finds the box of SearchBox from what lies in \a scan. \returns whether nothing beyond matters.
+bool RegionMap::SearchWithin(const GridBox& scan, Region region, int volume, GridBox& found, const Progress& progress) const
+{
   std::array<int, 3> blocks;
   Eigen::Vector3d slack;
   for (int axis = 0; axis < 3; ++axis) {
@@ -155,16 +202,22 @@ GridBox RegionMap::SearchBox(Region region, int volume, const Progress& progress
           upper = upper.max(to + reach / spacing_.array());
         }
       }
+  found = {};
+  bool enough = true; // where the scan does not end with the grid
+  for (int axis = 0; axis < 3; ++axis) {
+    enough = enough && (scan.first[axis] == 0 || lower[axis] >= 0.0);
+    enough = enough && (scan.first[axis] + scan.size[axis] == coverage_.Dimensions()[axis] || upper[axis] < scan.size[axis]);
+  }
   lower = lower.max(first).floor();
   upper = upper.min(last).ceil();
   if (!(lower <= upper).all())
-    return {};
-  GridBox box;
+    return enough;
   for (int axis = 0; axis < 3; ++axis) {
-    box.first[axis] = scan.first[axis] + static_cast<int>(lower[axis]);
-    box.size[axis] = static_cast<int>(upper[axis] - lower[axis]) + 1;
+    found.first[axis] = scan.first[axis] + static_cast<int>(lower[axis]);
+    found.size[axis] = static_cast<int>(upper[axis] - lower[axis]) + 1;
   }
-  return box.Intersected(scan);
+  found = found.Intersected(scan);
+  return enough;
 }
 
 Boxed<float> RegionMap::SquaredDistanceTo(Region region, int volume, const Progress& progress) const
@@ -228,7 +281,7 @@ void RegionMap::GiveCores(const Progress& progress)
   const auto forOverlap = [&](int v, const Boxed<float>& depth, const auto& body) {
     const GridBox& own = Box(v);
     ForRows(own, Progress(), [&](int j, int k) {
-      const unsigned char* count = coverage_.Row(j, k) + own.first[0];
+      const unsigned char* count = std::as_const(coverage_).At(own.first[0], j, k);
       unsigned char* inside = masks_[v].Row(j, k);
       const float* squared = depth.box.HasRow(j, k) ? depth.Row(j, k) + (own.first[0] - depth.box.first[0]) : nullptr;
       std::ptrdiff_t number = OverlapBefore(own.first[0], j, k);
@@ -242,10 +295,14 @@ void RegionMap::GiveCores(const Progress& progress)
   };
   // How deep the deepest volume lies at each voxel of the overlap.
   std::vector<float> deepest(static_cast<std::size_t>(OverlapCount()), 0.0f);
+  const auto meetsCovered = [&](int v) {
+    return std::any_of(covered.begin(), covered.end(), [&](int w) { return !Box(v).Intersected(Box(w)).Empty(); });
+  };
   for (int v = 0; v < Count(); ++v)
-    forOverlap(v, depthOf(v), [&](unsigned char&, std::ptrdiff_t number, float squared) {
-      deepest[number] = std::max(deepest[number], squared);
-    });
+    if (meetsCovered(v)) // elsewhere nobody asks
+      forOverlap(v, depthOf(v), [&](unsigned char&, std::ptrdiff_t number, float squared) {
+        deepest[number] = std::max(deepest[number], squared);
+      });
   for (const int v : covered) {
     const Boxed<float> depth = depthOf(v);
     forOverlap(v, depth, [&](unsigned char& inside, std::ptrdiff_t number, float squared) {

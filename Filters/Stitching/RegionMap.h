@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Base/Progress.h"
-#include "GridBox.h"
+#include "CoverageMap.h"
 #include <vector>
 
 namespace echorama {
@@ -15,17 +15,17 @@ enum class Region {
 
 /// The regions of n volumes in the output grid, and the distances between them.
 ///
-/// It keeps one byte per voxel of each volume's own box and one per voxel of the grid; regions and distances are made for
+/// It keeps two bytes at most per voxel of each volume's own box, nothing of where no box is; regions and distances are made for
 /// one volume at a time, in the smallest box that certainly holds the answer. Grids of one slice are treated as 2D.
 class RegionMap {
 public:
   /// \param masks where each volume lies: 1 inside, 0 outside, in a box within the grid
-  /// \param spacing of the grid, mm
-  /// \param coverage receives how many volumes cover each voxel (255 stands for 255 and more); it must outlive the map
-  RegionMap(std::vector<Boxed<unsigned char>> masks, const Eigen::Vector3d& spacing, VolumeView<unsigned char> coverage,
+  /// \param dimensions, spacing of the grid, mm
+  RegionMap(std::vector<Boxed<unsigned char>> masks, const std::array<int, 3>& dimensions, const Eigen::Vector3d& spacing,
             const Progress& progress = {});
 
   int Count() const { return static_cast<int>(masks_.size()); }
+  const CoverageMap& Coverage() const { return coverage_; } ///< how many volumes cover each voxel
   const GridBox& Box(int volume) const { return masks_[volume].box; }
 
   ///@{
@@ -69,11 +69,12 @@ private:
     bool core = false;
   };
   GridBox SearchBox(Region region, int volume, const Progress& progress) const;
+  bool SearchWithin(const GridBox& scan, Region region, int volume, GridBox& found, const Progress& progress) const;
 
   std::vector<Boxed<unsigned char>> masks_; // bit 0: inside, bit 1: core
   std::vector<Counts> counts_;
   Eigen::Vector3d spacing_;
-  VolumeView<unsigned char> coverage_;
+  CoverageMap coverage_;
   std::vector<std::ptrdiff_t> overlapBefore_; // per row of the grid, and the whole at the end
 };
 

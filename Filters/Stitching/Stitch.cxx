@@ -28,7 +28,7 @@ namespace echorama {
 
 namespace {
 
-// What is decided for all voxels together is decided on a grid of about so many at most.
+// What is decided for all voxels together is decided on a grid that has about so many at most where volumes are.
 constexpr double coarseVoxels = 1.5e6;
 
 // Details are made stronger or weaker by no more than this: a shadow holds nothing but noise.
@@ -180,22 +180,20 @@ void StitchPlan::Parts::FindScales(const Progress& progress)
   if (factor > 1)
     for (const StitchInput& input : inputs)
       coarser.emplace_back(input, planGrid, parameters.reliabilityFloor);
-  Volume<unsigned char> coverage(planGrid.dimensions);
-  RegionMap regions(MasksOf(factor > 1 ? coarser : samplers, progress.Part(0.0, 0.15)), planGrid.spacing, coverage.View(),
+  RegionMap regions(MasksOf(factor > 1 ? coarser : samplers, progress.Part(0.0, 0.15)), planGrid.dimensions, planGrid.spacing,
                     progress.Part(0.15, 0.2));
   if (factor == 1)
     CheckRegions(parameters, inputs, regions);
   const StitchMethod method = parameters.method;
   if (method == StitchMethod::Distance || method == StitchMethod::Membrane)
     regions.GiveCores(progress.Part(0.2, 0.3));
-  const VolumeView<const unsigned char> covered = coverage.View();
-  scales = StitchScales(parameters, regions, covered, planGrid.spacing, bound, progress.Part(0.3, 0.85));
+  scales = StitchScales(parameters, regions, planGrid.spacing, bound, progress.Part(0.3, 0.85));
   if (NeedsLows()) {
     blocks = BlocksOf(grid, parameters.detailScale);
     const double n = static_cast<double>(inputs.size());
     for (std::size_t v = 0; v < inputs.size(); ++v)
       lows.push_back(
-          LowPass(samplers[v], blocks, covered, factor,
+          LowPass(samplers[v], blocks, regions.Coverage(), factor,
                   progress.Part(0.85 + 0.15 * static_cast<double>(v) / n, 0.85 + 0.15 * static_cast<double>(v + 1) / n),
                   factor == 1 ? &regions.Mask(static_cast<int>(v)) : nullptr));
   }
@@ -218,12 +216,15 @@ void StitchPlan::Parts::FindScales(const Progress& progress)
       unsigned char* known = field.known.Row(j, k);
       const unsigned char* inside = own.HasRow(j, k) ? regions.MaskRow(v, j, k) : nullptr;
       const float* scale = scales[v].Row(j, k);
-      for (int x = 0; x < field.values.box.size[0]; ++x) {
+      const int count = field.values.box.size[0];
+      std::vector<unsigned char> covered(static_cast<std::size_t>(count));
+      regions.Coverage().Copy(field.values.box.first[0], j, k, count, covered.data());
+      for (int x = 0; x < count; ++x) {
         const int i = field.values.box.first[0] + x;
-        known[x] = covered(i, j, k) > 0;
+        known[x] = covered[static_cast<std::size_t>(x)] > 0;
         const bool here = inside && i >= own.first[0] && i < own.first[0] + own.size[0] && (inside[i - own.first[0]] & 1);
         if (here)
-          value[x] = covered(i, j, k) == 1 || !scale ? 1.0f : scale[i - scales[v].spans->First(j, k)];
+          value[x] = covered[static_cast<std::size_t>(x)] == 1 || !scale ? 1.0f : scale[i - scales[v].spans->First(j, k)];
       }
     });
     coarseScales.push_back(std::move(field));
@@ -275,8 +276,12 @@ void StitchPlan::Parts::FindWhatIsCoarse(const Progress& progress)
   gains.offset.assign(inputs.size(), 0.0);
   if (!NeedsLows())
     return;
+  double reached = 0.0; // of the grid, at most
+  for (const StitchSampler& sampler : samplers)
+    reached += static_cast<double>(sampler.Box().VoxelCount());
+  const double share = std::min(1.0, reached / static_cast<double>(grid.VoxelCount()));
   int step = factor;
-  while (static_cast<double>(Coarsened(grid, step).VoxelCount()) > coarseVoxels)
+  while (share * static_cast<double>(Coarsened(grid, step).VoxelCount()) > coarseVoxels)
     ++step;
   const std::vector<CoarseVolume> volumes = CoarseVolumes(Coarsened(grid, step));
   progress(0.5);
@@ -352,10 +357,6 @@ public:
       shown_(width_), sum_(width_), scratch_(2 * width_), values_(layers_.size()), lows_(layers_.size()), scales_(layers_.size()),
       weights_(layers_.size()), shares_(layers_.size()), trusts_(layers_.size()), deviations_(layers_.size())
   {
-    for (std::size_t v = 0; v < layers_.size() && parts.textured; ++v) {
-      layers_[v].lows = std::make_unique<SmoothRows<A>>(parts.blocks, parts.lows[v].low);
-      layers_[v].deviations = std::make_unique<SmoothRows<float>>(parts.blocks, parts.lows[v].deviation);
-    }
   }
 
   void Row(int j, int k)
@@ -367,6 +368,11 @@ public:
       std::fill_n(output_.weights[v].Row(y, z), n, 0.0f);
     if (!output_.spread.Empty())
       std::fill_n(output_.spread.Row(y, z), n, 0.0f);
+    if (rows_.empty()) { // most of a large grid is empty
+      std::fill_n(output_.valid.Row(y, z), n, static_cast<unsigned char>(0));
+      std::fill_n(output_.intensity.Row(y, z), n, T(0));
+      return;
+    }
     std::fill(shown_.begin(), shown_.end(), A(0));
     for (const int v : rows_) {
       const Layer& layer = layers_[v];
@@ -480,6 +486,10 @@ private:
       float* const deviation = layer.deviation.data();
       const int x = box_.first[0];
       const unsigned char* const wanted = layer.shared.data();
+      if (!layer.lows) {
+        layer.lows = std::make_unique<SmoothRows<A>>(parts_.blocks, parts_.lows[v].low);
+        layer.deviations = std::make_unique<SmoothRows<float>>(parts_.blocks, parts_.lows[v].deviation);
+      }
       if (!layer.lows->Row(j, k, x + first, x + end, wanted + first, low + first))
         parts_.lowSamplers[v].Row(j, k, x, x + n, wanted, noValue, low);
       if (!layer.deviations->Row(j, k, x + first, x + end, wanted + first, deviation + first))

@@ -19,6 +19,9 @@ namespace {
 // certificate in float, kinds, on all levels.
 constexpr double membraneBytes = 32.0;
 
+// Bytes per row of the grid: where its counts, its overlap and the pieces of that begin.
+constexpr double rowBytes = 24.0;
+
 std::string Gigabytes(double bytes)
 {
   return Format(bytes < 1e8 ? "%.3g GB" : "%.1f GB", bytes * 1e-9);
@@ -32,8 +35,9 @@ double AllowedMemory(const StitchParameters& parameters)
 }
 
 // Of a plan on the grid itself; a coarser one takes less by its voxels.
-double PlanBytes(const StitchParameters& parameters, const std::vector<GridBox>& boxes, double voxels)
+double PlanBytes(const StitchParameters& parameters, const std::vector<GridBox>& boxes, const ImageGeometry& grid)
 {
+  const double voxels = static_cast<double>(grid.VoxelCount());
   double sum = 0.0, largest = 0.0, overlaps = 0.0, largestOverlap = 0.0;
   for (std::size_t v = 0; v < boxes.size(); ++v) {
     const double box = static_cast<double>(boxes[v].VoxelCount());
@@ -47,7 +51,7 @@ double PlanBytes(const StitchParameters& parameters, const std::vector<GridBox>&
     overlaps += overlap;
     largestOverlap = std::max(largestOverlap, overlap);
   }
-  const double regions = sum + voxels;
+  const double regions = sum + std::min(sum, voxels) + rowBytes * grid.dimensions[1] * grid.dimensions[2];
   switch (parameters.method) {
   case StitchMethod::Membrane:
     return regions + 4.0 * overlaps + membraneBytes * largestOverlap;
@@ -78,9 +82,9 @@ StitchCost CostOfStitch(const StitchParameters& parameters, const std::vector<Im
                     (outputs.weights ? 4.0 * static_cast<double>(volumes.size()) : 0.0);
   cost.outputBytes = cost.voxelBytes * voxels;
   cost.allowedBytes = AllowedMemory(parameters);
-  const double full = PlanBytes(parameters, boxes, voxels);
+  const double full = PlanBytes(parameters, boxes, grid);
   cost.planBytes = full;
-  const auto fits = [&] { return cost.planBytes <= 0.5 * cost.allowedBytes; };
+  const auto fits = [&] { return cost.planBytes <= (cost.planFactor == 1 ? 0.75 : 0.5) * cost.allowedBytes; };
   if (cost.WholeBytes() > cost.allowedBytes)
     while (!fits() && cost.planFactor < 64) {
       ++cost.planFactor;

@@ -21,8 +21,8 @@ struct StitchCost {
 };
 
 /// What stitching volumes of these geometries (ReachOf) on \a grid costs. The plan is made on the output's grid if it fits into
-/// the allowed memory together with the whole output, or else takes less than half of it; otherwise on the finest grid for which
-/// it does the latter. How the output is asked for, whole or in pieces, makes no difference.
+/// the allowed memory together with the whole output, or else takes at most three quarters of it; otherwise on the finest
+/// grid for which it takes at most half. How the output is asked for, whole or in pieces, makes no difference.
 StitchCost CostOfStitch(const StitchParameters& parameters, const std::vector<ImageGeometry>& volumes, const ImageGeometry& grid,
                         const StitchOutputs& outputs);
 

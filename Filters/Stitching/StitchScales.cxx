@@ -14,15 +14,14 @@ namespace echorama {
 namespace {
 
 // Spans of the overlap voxels of a volume; with a rim, also of their six neighbours.
-std::shared_ptr<const RowSpans> OverlapSpans(const RegionMap& regions, VolumeView<const unsigned char> coverage, int volume,
-                                             bool rim)
+std::shared_ptr<const RowSpans> OverlapSpans(const RegionMap& regions, int volume, bool rim)
 {
   const GridBox& own = regions.Box(volume);
   const std::size_t rows = static_cast<std::size_t>(own.size[1]) * static_cast<std::size_t>(own.size[2]);
   std::vector<int> first(rows, 0), end(rows, 0);
   ForRows(own, Progress(), [&](int j, int k) {
     const unsigned char* inside = regions.MaskRow(volume, j, k) - own.first[0];
-    const unsigned char* covered = coverage.Row(j, k);
+    const unsigned char* covered = regions.Coverage().At(own.first[0], j, k) - own.first[0];
     const auto shared = [&](int i) { return (inside[i] & 1) && covered[i] > 1; };
     int a = own.first[0], b = own.first[0] + own.size[0];
     while (a < b && !shared(a))
@@ -38,7 +37,7 @@ std::shared_ptr<const RowSpans> OverlapSpans(const RegionMap& regions, VolumeVie
     return std::make_shared<const RowSpans>(own, std::move(first), std::move(end));
   const RowSpans inner(own, std::move(first), std::move(end));
   GridBox grown;
-  const auto& n = coverage.Dimensions();
+  const auto& n = regions.Coverage().Dimensions();
   for (int axis = 0; axis < 3; ++axis) {
     grown.first[axis] = std::max(0, own.first[axis] - 1);
     grown.size[axis] = std::min(n[axis], own.first[axis] + own.size[axis] + 1) - grown.first[axis];
@@ -72,17 +71,17 @@ private:
   const float* squared_;
 };
 
-RowField<float> DistanceScale(const RegionMap& regions, VolumeView<const unsigned char> coverage, int volume,
-                              const Progress& progress)
+RowField<float> DistanceScale(const RegionMap& regions, int volume, const Progress& progress)
 {
-  RowField<float> scale(OverlapSpans(regions, coverage, volume, false));
+  RowField<float> scale(OverlapSpans(regions, volume, false));
   if (scale.values.empty())
     return scale;
   const Boxed<float> pure = regions.SquaredDistanceTo(Region::Pure, volume, progress.Part(0.0, 0.45));
   const Boxed<float> empty = regions.SquaredDistanceTo(Region::Empty, volume, progress.Part(0.45, 0.9));
   ForRows(scale.spans->Box(), progress.Part(0.9, 1.0), [&](int j, int k) {
     float* out = scale.Row(j, k);
-    const unsigned char *covered = coverage.Row(j, k), *inside = regions.MaskRow(volume, j, k) - regions.Box(volume).first[0];
+    const int start = regions.Box(volume).first[0];
+    const unsigned char *covered = regions.Coverage().At(start, j, k) - start, *inside = regions.MaskRow(volume, j, k) - start;
     const Distance p(pure, j, k), e(empty, j, k);
     const int first = scale.spans->First(j, k);
     for (int i = first; i < scale.spans->End(j, k); ++i)
@@ -92,10 +91,9 @@ RowField<float> DistanceScale(const RegionMap& regions, VolumeView<const unsigne
   return scale;
 }
 
-RowField<float> DepthScale(const RegionMap& regions, VolumeView<const unsigned char> coverage, int volume,
-                           const Progress& progress)
+RowField<float> DepthScale(const RegionMap& regions, int volume, const Progress& progress)
 {
-  RowField<float> scale(OverlapSpans(regions, coverage, volume, false));
+  RowField<float> scale(OverlapSpans(regions, volume, false));
   if (scale.values.empty())
     return scale;
   const Boxed<float> depth = regions.SquaredDepth(volume, progress);
@@ -109,11 +107,12 @@ RowField<float> DepthScale(const RegionMap& regions, VolumeView<const unsigned c
 }
 
 // What the voxels of a row are to the membrane of a volume, before other volumes' cores and membranes are looked at: beside the
-// volume's box, and within it, where \a mask says where it is (bit 0) and has its core (bit 1).
-ECHORAMA_HOT void BeginBeside(const unsigned char* coverage, int count, unsigned char* kind)
+// volume's box, where \a kind comes in as the coverage, and within it, where \a mask says where it is (bit 0) and has its core
+// (bit 1).
+ECHORAMA_HOT void BeginBeside(int count, unsigned char* kind)
 {
   for (int i = 0; i < count; ++i)
-    kind[i] = static_cast<unsigned char>(coverage[i] != 0 ? MembraneVoxel::Known : MembraneVoxel::Void);
+    kind[i] = static_cast<unsigned char>(kind[i] != 0 ? MembraneVoxel::Known : MembraneVoxel::Void);
 }
 
 ECHORAMA_HOT void BeginWithin(const unsigned char* coverage, const unsigned char* mask, int count, unsigned char* __restrict kind,
@@ -128,10 +127,10 @@ ECHORAMA_HOT void BeginWithin(const unsigned char* coverage, const unsigned char
 }
 
 RowField<float> MembraneScale(const StitchParameters& parameters, const RegionMap& regions, const OverlapComponents& components,
-                              VolumeView<const unsigned char> coverage, const Eigen::Vector3d& spacing, int volume,
-                              const std::vector<RowField<float>>& before, double& worst, const Progress& progress)
+                              const Eigen::Vector3d& spacing, int volume, const std::vector<RowField<float>>& before,
+                              double& worst, const Progress& progress)
 {
-  RowField<float> scale(OverlapSpans(regions, coverage, volume, true));
+  RowField<float> scale(OverlapSpans(regions, volume, true));
   if (scale.values.empty())
     return scale;
   RowField<unsigned char> kinds(scale.spans);
@@ -147,16 +146,18 @@ RowField<float> MembraneScale(const StitchParameters& parameters, const RegionMa
       return;
     unsigned char* const kind = kinds.Row(j, k) - first;
     float* const value = scale.Row(j, k) - first;
-    const unsigned char* const covered = coverage.Row(j, k);
     // The part of the span that lies in the box of the volume; beside it only others can be.
     const bool has = own.HasRow(j, k);
     const int from = has ? std::clamp(own.first[0], first, end) : end;
     const int to = has ? std::clamp(own.first[0] + own.size[0], from, end) : end;
-    BeginBeside(covered + first, from - first, kind + first);
-    BeginBeside(covered + to, end - to, kind + to);
+    regions.Coverage().Copy(first, j, k, from - first, kind + first);
+    BeginBeside(from - first, kind + first);
+    regions.Coverage().Copy(to, j, k, end - to, kind + to);
+    BeginBeside(end - to, kind + to);
     if (from == to)
       return;
-    BeginWithin(covered + from, regions.MaskRow(volume, j, k) + (from - own.first[0]), to - from, kind + from, value + from);
+    BeginWithin(regions.Coverage().At(from, j, k), regions.MaskRow(volume, j, k) + (from - own.first[0]), to - from, kind + from,
+                value + from);
     constexpr auto unknown = static_cast<unsigned char>(MembraneVoxel::Unknown);
     for (const int other : cored) {
       const GridBox row = GridBox{{from, j, k}, {to - from, 1, 1}}.Intersected(regions.Box(other));
@@ -193,8 +194,7 @@ RowField<float> MembraneScale(const StitchParameters& parameters, const RegionMa
 } // namespace
 
 std::vector<RowField<float>> StitchScales(const StitchParameters& parameters, const RegionMap& regions,
-                                          VolumeView<const unsigned char> coverage, const Eigen::Vector3d& spacing, double& worst,
-                                          const Progress& progress)
+                                          const Eigen::Vector3d& spacing, double& worst, const Progress& progress)
 {
   std::vector<RowField<float>> scales;
   worst = 0.0;
@@ -203,12 +203,12 @@ std::vector<RowField<float>> StitchScales(const StitchParameters& parameters, co
     return scales;
   }
   const bool membrane = parameters.method == StitchMethod::Membrane;
-  const OverlapComponents components = membrane ? OverlapComponents(regions, coverage) : OverlapComponents();
+  const OverlapComponents components = membrane ? OverlapComponents(regions) : OverlapComponents();
   for (int v = 0; v < regions.Count(); ++v) {
     const Progress part = progress.Part(static_cast<double>(v) / regions.Count(), (v + 1.0) / regions.Count());
-    scales.push_back(membrane ? MembraneScale(parameters, regions, components, coverage, spacing, v, scales, worst, part)
-                     : parameters.method == StitchMethod::Feather ? DepthScale(regions, coverage, v, part)
-                                                                  : DistanceScale(regions, coverage, v, part));
+    scales.push_back(membrane ? MembraneScale(parameters, regions, components, spacing, v, scales, worst, part)
+                     : parameters.method == StitchMethod::Feather ? DepthScale(regions, v, part)
+                                                                  : DistanceScale(regions, v, part));
   }
   return scales;
 }

@@ -13,9 +13,8 @@ namespace echorama {
 ///
 /// A membrane is 1 where the volume is alone and in its core, 0 where only others are and in the cores of others; where two
 /// volumes alone meet, one membrane is solved and the other is the rest to 1. Pieces that touch neither get 0.5 throughout.
-/// \param coverage the same that \a regions was made with \param worst receives the largest certified bound of the membranes
+/// \param worst receives the largest certified bound of the membranes
 std::vector<RowField<float>> StitchScales(const StitchParameters& parameters, const RegionMap& regions,
-                                          VolumeView<const unsigned char> coverage, const Eigen::Vector3d& spacing, double& worst,
-                                          const Progress& progress = {});
+                                          const Eigen::Vector3d& spacing, double& worst, const Progress& progress = {});
 
 } // namespace echorama

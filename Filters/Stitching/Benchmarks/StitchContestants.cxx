@@ -9,6 +9,7 @@
 #include "Filters/Stitching/StitchScales.h"
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace echorama {
 
@@ -25,15 +26,15 @@ std::vector<StitchSampler> SamplersOf(const std::vector<StitchInput>& volumes, c
 }
 
 // All volumes on a grid, with their scales by distance; without smooth parts.
-std::vector<CoarseVolume> Resampled(const std::vector<StitchSampler>& samplers, const ImageGeometry& grid,
-                                    Volume<unsigned char>& coverage)
+std::vector<CoarseVolume> Resampled(const std::vector<StitchSampler>& samplers, const ImageGeometry& grid, CoverageMap& coverage)
 {
-  RegionMap regions(MasksOf(samplers, {}), grid.spacing, coverage.View());
+  RegionMap regions(MasksOf(samplers, {}), grid.dimensions, grid.spacing);
   regions.GiveCores();
   StitchParameters parameters;
   parameters.method = StitchMethod::Distance;
   double bound = 0.0;
-  const std::vector<RowField<float>> scales = StitchScales(parameters, regions, coverage.View(), grid.spacing, bound);
+  const std::vector<RowField<float>> scales = StitchScales(parameters, regions, grid.spacing, bound);
+  coverage = regions.Coverage();
   std::vector<CoarseVolume> volumes(samplers.size());
   for (std::size_t v = 0; v < samplers.size(); ++v) {
     CoarseVolume& volume = volumes[v];
@@ -48,7 +49,7 @@ std::vector<CoarseVolume> Resampled(const std::vector<StitchSampler>& samplers, 
       const float* scale = scales[v].Row(j, k);
       const int first = scales[v].spans->First(j, k);
       for (int i = first; scale && i < scales[v].spans->End(j, k); ++i)
-        if (coverage.View()(i, j, k) > 1)
+        if (*std::as_const(coverage).At(i, j, k) > 1)
           volume.scale.Row(j, k)[i - box.first[0]] = scale[i - first];
       for (int i = 0; i < box.size[0]; ++i)
         if (!(inside[i] & 1))
@@ -80,12 +81,12 @@ ContestantStitch StitchByLabels(const std::vector<StitchInput>& volumes, const I
   while (static_cast<double>(Coarsened(grid, step).VoxelCount()) > coarseVoxels)
     ++step;
   const ImageGeometry coarse = Coarsened(grid, step);
-  Volume<unsigned char> coverage(coarse.dimensions);
+  CoverageMap coverage;
   std::vector<CoarseVolume> sampled = Resampled(SamplersOf(volumes, coarse), coarse, coverage);
   const std::vector<StitchSampler> samplers = SamplersOf(volumes, grid);
   const BlockLattice blocks = BlocksOf(grid, StitchParameters().detailScale);
   for (std::size_t v = 0; v < sampled.size(); ++v) {
-    const SmoothPart smooth = LowPass(samplers[v], blocks, coverage.View(), step);
+    const SmoothPart smooth = LowPass(samplers[v], blocks, coverage, step);
     const PosedVolume<float> lows{smooth.low.values.View(), {}, Cropped(blocks.geometry, smooth.low.box)};
     const CoarseSampler low(RowSampler<float>(lows, coarse));
     const GridBox& box = sampled[v].inside.box;
@@ -139,7 +140,10 @@ ContestantStitch StitchByLabels(const std::vector<StitchInput>& volumes, const I
 ContestantStitch StitchByMultiband(const std::vector<StitchInput>& volumes, const ImageGeometry& grid)
 {
   ContestantStitch result{{}, Volume<unsigned char>(grid.dimensions)};
-  std::vector<CoarseVolume> sampled = Resampled(SamplersOf(volumes, grid), grid, result.coverage);
+  CoverageMap coverage;
+  std::vector<CoarseVolume> sampled = Resampled(SamplersOf(volumes, grid), grid, coverage);
+  ForRows({{0, 0, 0}, grid.dimensions}, Progress(),
+          [&](int j, int k) { coverage.Copy(0, j, k, grid.dimensions[0], result.coverage.View().Row(j, k)); });
   const Volume<unsigned short> labels = LargestScale(sampled, grid.dimensions);
   std::vector<ResampledVolume> resampled;
   for (std::size_t v = 0; v < sampled.size(); ++v)

@@ -20,6 +20,15 @@ StitchSampler SamplerOf(const Volume<float>& values, const ImageGeometry& geomet
   return StitchSampler({PosedVolume<float>{values.View(), {}, geometry}, "volume"}, grid, 0.01);
 }
 
+CoverageMap MapOf(const Volume<unsigned char>& counts)
+{
+  CoverageMap map(counts.Dimensions(), {{{0, 0, 0}, counts.Dimensions()}});
+  for (int k = 0; k < counts.Dimensions()[2]; ++k)
+    for (int j = 0; j < counts.Dimensions()[1]; ++j)
+      std::copy_n(counts.View().Row(j, k), counts.Dimensions()[0], map.At(0, j, k));
+  return map;
+}
+
 } // namespace
 
 TEST(LowPass, BlocksAreCubesAndCoverTheGrid)
@@ -40,7 +49,7 @@ TEST(LowPass, KeepsConstantsAndLosesTexture)
   const BlockLattice blocks = BlocksOf(grid, 2.0);
   const Volume<float> constant(grid.dimensions, 0.1f);
   for (const double scale : {2.0, 5.0, 16.0}) {
-    const SmoothPart flat = LowPass(SamplerOf(constant, grid, grid), BlocksOf(grid, scale), shared.View(), 1);
+    const SmoothPart flat = LowPass(SamplerOf(constant, grid, grid), BlocksOf(grid, scale), MapOf(shared), 1);
     for (const float value : flat.low.values.View())
       EXPECT_EQ(value, 0.1f);
     for (const float value : flat.deviation.values.View())
@@ -51,7 +60,7 @@ TEST(LowPass, KeepsConstantsAndLosesTexture)
   Random random(1);
   for (float& value : noise.View())
     value = static_cast<float>(100.0 + 20.0 * random.Normal());
-  const SmoothPart rough = LowPass(SamplerOf(noise, grid, grid), blocks, shared.View(), 1);
+  const SmoothPart rough = LowPass(SamplerOf(noise, grid, grid), blocks, MapOf(shared), 1);
   // A block of 8 voxels keeps 1/8 of the variance, and (1 2 1)/4 3/8 of that along each axis.
   double variance = 0.0, deviation = 0.0, count = 0.0;
   for (int k = 2; k < 14; ++k)
@@ -76,7 +85,7 @@ TEST(LowPass, IsOfTheOverlapAlone)
         coverage.View()(i, j, k) = 2;
         values.View()(i, j, k) = 5.0f;
       }
-  const SmoothPart part = LowPass(SamplerOf(values, grid, grid), BlocksOf(grid, 4.0), coverage.View(), 1);
+  const SmoothPart part = LowPass(SamplerOf(values, grid, grid), BlocksOf(grid, 4.0), MapOf(coverage), 1);
   const auto low = part.low.values.View();
   for (int block = 0; block < 10; ++block) {
     const bool near = block >= 1 && block <= 7; // blocks 2 to 6 hold overlap, and one more on either side
@@ -109,8 +118,8 @@ TEST(LowPass, VolumesThatAgreeHaveTheSameSmoothPart)
         coverage.View()(i, j, k) = 2;
     }
   const BlockLattice blocks = BlocksOf(grid, 3.0);
-  const SmoothPart p = LowPass(SamplerOf(first, a, grid), blocks, coverage.View(), 1);
-  const SmoothPart q = LowPass(SamplerOf(second, b, grid), blocks, coverage.View(), 1);
+  const SmoothPart p = LowPass(SamplerOf(first, a, grid), blocks, MapOf(coverage), 1);
+  const SmoothPart q = LowPass(SamplerOf(second, b, grid), blocks, MapOf(coverage), 1);
   int compared = 0;
   for (int k = 0; k < p.low.box.size[2]; ++k)
     for (int j = 0; j < p.low.box.size[1]; ++j)
@@ -126,7 +135,7 @@ TEST(LowPass, RefusesNothingAndWorksInTheFlat)
   const ImageGeometry grid = Grid({13, 11, 1});
   const Volume<unsigned char> shared(grid.dimensions, 2);
   const Volume<float> values(grid.dimensions, 3.0f);
-  const SmoothPart part = LowPass(SamplerOf(values, grid, grid), BlocksOf(grid, 2.0), shared.View(), 1);
+  const SmoothPart part = LowPass(SamplerOf(values, grid, grid), BlocksOf(grid, 2.0), MapOf(shared), 1);
   for (const float value : part.low.values.View())
     EXPECT_EQ(value, 3.0f);
 }

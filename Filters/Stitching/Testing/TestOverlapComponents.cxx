@@ -8,13 +8,11 @@ namespace {
 
 // Boxes in a grid, and the pieces of their overlap.
 struct Pieces {
-  Volume<unsigned char> coverage;
   RegionMap regions;
   OverlapComponents components;
 
   Pieces(const std::array<int, 3>& grid, const std::vector<GridBox>& boxes)
-    : coverage(grid), regions(Masks(boxes), Eigen::Vector3d::Ones(), coverage.View()),
-      components((regions.GiveCores(), regions), coverage.View())
+    : regions(Masks(boxes), grid, Eigen::Vector3d::Ones()), components((regions.GiveCores(), regions))
   {
   }
   static std::vector<Boxed<unsigned char>> Masks(const std::vector<GridBox>& boxes)

@@ -16,11 +16,9 @@ struct Scene {
   std::array<int, 3> n;
   Eigen::Vector3d spacing;
   std::vector<Mask> masks;
-  Volume<unsigned char> coverage;
 
-  RegionMap Regions()
+  RegionMap Regions() const
   {
-    coverage = Volume<unsigned char>(n, 77);
     std::vector<Boxed<unsigned char>> boxed;
     for (const Mask& mask : masks) {
       std::array<int, 3> first = n, last{-1, -1, -1};
@@ -39,7 +37,7 @@ struct Scene {
             piece.values.View()(i, j, k) = mask.View()(first[0] + i, first[1] + j, first[2] + k);
       boxed.push_back(std::move(piece));
     }
-    return RegionMap(std::move(boxed), spacing, coverage.View());
+    return RegionMap(std::move(boxed), n, spacing);
   }
 
   template <class Body>
@@ -70,7 +68,7 @@ struct Scene {
 // Blobs: unions of a few balls, so that necks, islands and nested shapes occur.
 Scene RandomScene(std::array<int, 3> n, const Eigen::Vector3d& spacing, int count, Random& random)
 {
-  Scene scene{n, spacing, {}, {}};
+  Scene scene{n, spacing, {}};
   for (int v = 0; v < count; ++v) {
     Mask mask(n);
     const int balls = 1 + static_cast<int>(random.Below(3));
@@ -109,6 +107,13 @@ Mask BoxMask(std::array<int, 3> n, std::array<int, 3> from, std::array<int, 3> t
   return mask;
 }
 
+int CoveredAt(const RegionMap& regions, int i, int j, int k)
+{
+  unsigned char count = 99;
+  regions.Coverage().Copy(i, j, k, 1, &count);
+  return count;
+}
+
 bool IsPure(const RegionMap& regions, int v, int i, int j, int k)
 {
   unsigned char out = 9;
@@ -128,7 +133,7 @@ TEST(RegionMap, RegionsAreTheBooleanOnes)
     std::vector<unsigned char> row(13);
     scene.ForAll([&](int i, int j, int k) {
       const int covered = scene.Others(-1, i, j, k);
-      ASSERT_EQ(scene.coverage.View()(i, j, k), covered);
+      ASSERT_EQ(CoveredAt(regions, i, j, k), covered);
       ASSERT_EQ(regions.OverlapBefore(i, j, k), number);
       number += covered > 1;
       for (int v = 0; v < regions.Count(); ++v)
@@ -183,16 +188,34 @@ TEST(RegionMap, DistancesAreMadeNearTheOverlapOnly)
 {
   // Two long rods side by side that touch over a short piece: the box must not be the grid.
   const std::array<int, 3> n{400, 24, 24};
-  Scene scene{n, {1.0, 1.0, 1.0}, {BoxMask(n, {0, 0, 0}, {210, 24, 24}), BoxMask(n, {190, 0, 0}, {400, 24, 24})}, {}};
+  Scene scene{n, {1.0, 1.0, 1.0}, {BoxMask(n, {0, 0, 0}, {210, 24, 24}), BoxMask(n, {190, 0, 0}, {400, 24, 24})}};
   const RegionMap regions = scene.Regions();
   EXPECT_LE(regions.SquaredDistanceTo(Region::Pure, 0).box.size[0], 90);
   EXPECT_LE(regions.SquaredDistanceTo(Region::Empty, 0).box.size[0], 90);
 }
 
+TEST(RegionMap, WhatIsFarAwayIsFoundAndTheVoidBetweenTakesNoMemory)
+{
+  // The second lies in the first, whose empty region is the far third and, nearer but beside a corner, the fourth.
+  const std::array<int, 3> n{240, 40, 30};
+  const Scene scene{n,
+                    {1.0, 1.0, 1.5},
+                    {BoxMask(n, {0, 0, 0}, {20, 20, 10}), BoxMask(n, {5, 5, 2}, {9, 9, 6}), BoxMask(n, {200, 3, 2}, {240, 13, 8}),
+                     BoxMask(n, {150, 36, 25}, {154, 39, 29})}};
+  const RegionMap regions = scene.Regions();
+  EXPECT_EQ(regions.Coverage().Bytes(), 20u * 20 * 10 + 40 * 10 * 6 + 4 * 3 * 4);
+  const Boxed<float> distance = regions.SquaredDistanceTo(Region::Empty, 0);
+  for (int k = 2; k < 6; ++k)
+    for (int j = 5; j < 9; ++j)
+      for (int i = 5; i < 9; ++i)
+        ASSERT_FLOAT_EQ(distance.Row(j, k)[i - distance.box.first[0]],
+                        static_cast<float>(BruteSquared(scene, Region::Empty, 0, i, j, k)));
+}
+
 TEST(RegionMap, DepthIsTheDistanceToTheOutside)
 {
   const std::array<int, 3> n{20, 20, 20};
-  Scene scene{n, {1.0, 2.0, 0.5}, {BoxMask(n, {0, 5, 6}, {10, 20, 14}), BoxMask(n, {0, 0, 0}, {20, 20, 20})}, {}};
+  Scene scene{n, {1.0, 2.0, 0.5}, {BoxMask(n, {0, 5, 6}, {10, 20, 14}), BoxMask(n, {0, 0, 0}, {20, 20, 20})}};
   const RegionMap regions = scene.Regions();
   const Boxed<float> depth = regions.SquaredDepth(0);
   for (int k = 6; k < 14; ++k)
@@ -210,8 +233,7 @@ TEST(RegionMap, AMiddleVolumeGetsTheCoreWhereItIsDeepest)
   const std::array<int, 3> n{18, 30, 1};
   Scene scene{n,
               {1.0, 1.0, 1.0},
-              {BoxMask(n, {0, 0, 0}, {10, 30, 1}), BoxMask(n, {4, 0, 0}, {14, 30, 1}), BoxMask(n, {8, 0, 0}, {18, 30, 1})},
-              {}};
+              {BoxMask(n, {0, 0, 0}, {10, 30, 1}), BoxMask(n, {4, 0, 0}, {14, 30, 1}), BoxMask(n, {8, 0, 0}, {18, 30, 1})}};
   RegionMap regions = scene.Regions();
   EXPECT_EQ(regions.PureCount(1), 0);
   regions.GiveCores();
@@ -229,12 +251,12 @@ TEST(RegionMap, IdenticalAndNestedVolumesHaveCores)
 {
   const std::array<int, 3> n{16, 16, 16};
   const Mask large = BoxMask(n, {0, 0, 0}, {16, 16, 16}), small = BoxMask(n, {5, 5, 5}, {10, 10, 10});
-  Scene same{n, {1.0, 1.0, 1.0}, {large, large}, {}};
+  Scene same{n, {1.0, 1.0, 1.0}, {large, large}};
   RegionMap regions = same.Regions();
   regions.GiveCores();
   same.ForAll([&](int i, int j, int k) { ASSERT_TRUE(IsPure(regions, 0, i, j, k) && IsPure(regions, 1, i, j, k)); });
 
-  Scene nested{n, {1.0, 1.0, 1.0}, {large, small}, {}};
+  Scene nested{n, {1.0, 1.0, 1.0}, {large, small}};
   regions = nested.Regions();
   regions.GiveCores();
   EXPECT_FALSE(regions.HasCore(0));
@@ -245,9 +267,9 @@ TEST(RegionMap, IdenticalAndNestedVolumesHaveCores)
 TEST(RegionMap, CoverageSaturates)
 {
   const std::array<int, 3> n{3, 2, 1};
-  Scene scene{n, {1.0, 1.0, 1.0}, std::vector<Mask>(300, BoxMask(n, {0, 0, 0}, {2, 2, 1})), {}};
+  Scene scene{n, {1.0, 1.0, 1.0}, std::vector<Mask>(300, BoxMask(n, {0, 0, 0}, {2, 2, 1}))};
   const RegionMap regions = scene.Regions();
-  EXPECT_EQ(scene.coverage.View()(0, 0, 0), 255);
-  EXPECT_EQ(scene.coverage.View()(2, 0, 0), 0);
+  EXPECT_EQ(CoveredAt(regions, 0, 0, 0), 255);
+  EXPECT_EQ(CoveredAt(regions, 2, 0, 0), 0);
   EXPECT_EQ(regions.OverlapCount(), 4);
 }

@@ -353,6 +353,38 @@ TEST(StitchPlan, ACoarsePlanComesCloseToTheExactOne)
   }
 }
 
+TEST(StitchPlan, PairsFarApartArePlannedAsIfTheyWereAlone)
+{
+  // More voxels than 32 bits count, a hundred thousand of which are of a volume: their plan takes what these need. Membranes are
+  // coarsened by the indices of voxels: the same, where the pairs are a multiple of all steps apart.
+  Scene<float> pair, both;
+  AddTexture(pair, {0, 0, 0}, {40, 30, 30}, 90.0, 20.0, 1);
+  AddTexture(pair, {25, 4, 3}, {40, 30, 30}, 110.0, 15.0, 2);
+  const std::array<int, 3> far{2048, 2048, 1024};
+  AddTexture(both, {0, 0, 0}, {20, 20, 20}, 90.0, 20.0, 3);
+  AddTexture(both, {12, 0, 0}, {20, 20, 20}, 90.0, 20.0, 4);
+  AddTexture(both, far, {40, 30, 30}, 90.0, 20.0, 1);
+  AddTexture(both, {far[0] + 25, far[1] + 4, far[2] + 3}, {40, 30, 30}, 110.0, 15.0, 2);
+  for (const StitchMethod method : {StitchMethod::Membrane, StitchMethod::Feather, StitchMethod::Average}) {
+    StitchParameters parameters;
+    parameters.method = method;
+    parameters.texture = StitchTexture::Mix; // the correlation of textures is measured over all volumes
+    const Result<float> alone = Stitched(pair, parameters);
+    parameters.maximumMemoryGb = 0.1;
+    const ImageGeometry grid = StitchGrid(both.geometries);
+    ASSERT_GT(grid.VoxelCount(), std::size_t{1} << 32);
+    const StitchPlan plan(parameters, both.inputs, grid, {sizeof(float)});
+    EXPECT_EQ(plan.Factor(), 1);
+    const GridBox box{far, alone.grid.dimensions};
+    Volume<float> intensity(box.size);
+    Volume<unsigned char> valid(box.size), coverage(box.size);
+    plan.Render<float>(box, {intensity.View(), valid.View(), coverage.View(), {}});
+    EXPECT_TRUE(std::equal(intensity.View().begin(), intensity.View().end(), alone.intensity.View().begin()))
+        << static_cast<int>(method);
+    EXPECT_TRUE(std::equal(coverage.View().begin(), coverage.View().end(), alone.coverage.View().begin()));
+  }
+}
+
 TEST(StitchPlan, CostIsStatedFirstAndSlabsFit)
 {
   ImageGeometry a, b;

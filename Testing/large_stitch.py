@@ -1,0 +1,68 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Stitches many small volumes that are far apart into one that is larger than the memory, with `echorama stitch --memory`, and
+prints time and peak memory: 200 volumes of 128^3 in ten rows over 2,000 x 2,000 x 1,000 voxels, or a part of these.
+
+    python3 Testing/large_stitch.py build/release/bin/echorama FOLDER [--size 2000 2000 1000] [--memory 2.4]
+
+FOLDER gets the volumes and the result; some 0.8 GB in the full size.
+"""
+import argparse
+import pathlib
+import resource
+import subprocess
+import time
+
+import numpy
+
+EDGE, COUNT, ROWS, SPACING = 128, 200, 10, 0.2
+
+
+def make_volumes(folder, size):
+    """Speckle on a slowly varying echo. Each is turned a little about z, so that it has to be interpolated."""
+    random = numpy.random.default_rng(1)
+    z, y, x = numpy.meshgrid(*[numpy.linspace(0, 1, EDGE)] * 3, indexing="ij")
+    echo = 100 + 40 * numpy.sin(9 * x) * numpy.cos(7 * y) * numpy.sin(5 * z + 1)
+    files = []
+    for number in range(COUNT):
+        row, column = divmod(number, COUNT // ROWS)
+        voxels = numpy.clip(echo * random.rayleigh(0.8, echo.shape), 1, 255).astype(numpy.uint8)
+        angle = numpy.deg2rad(random.uniform(-1.5, 1.5))
+        cosine, sine = numpy.cos(angle), numpy.sin(angle)
+        along = numpy.array([column / (COUNT // ROWS - 1), row / (ROWS - 1), row / (ROWS - 1)])
+        offset = (numpy.array(size) - EDGE) * along * SPACING
+        header = f"""ObjectType = Image
+NDims = 3
+BinaryData = True
+BinaryDataByteOrderMSB = False
+CompressedData = False
+TransformMatrix = {cosine} {sine} 0 {-sine} {cosine} 0 0 0 1
+Offset = {offset[0]} {offset[1]} {offset[2]}
+ElementSpacing = {SPACING} {SPACING} {SPACING}
+DimSize = {EDGE} {EDGE} {EDGE}
+ElementType = MET_UCHAR
+ElementDataFile = LOCAL
+"""
+        files.append(folder / f"volume{number:03d}.mha")
+        files[-1].write_bytes(header.encode() + voxels.tobytes())
+    return files
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("program")
+    parser.add_argument("folder", type=pathlib.Path)
+    parser.add_argument("--size", type=int, nargs=3, default=[2000, 2000, 1000], help="voxels of the result, about")
+    parser.add_argument("--memory", default="2.4", help="that stitch may use beside the volumes, GB")
+    options = parser.parse_args()
+    options.folder.mkdir(parents=True, exist_ok=True)
+    files = make_volumes(options.folder, options.size)
+    start = time.time()
+    subprocess.run([options.program, "stitch", *files, "-o", options.folder / "stitched.mha", "--memory", options.memory], check=True)
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    print(f"{time.time() - start:.0f} s, {used.ru_utime + used.ru_stime:.0f} s of processor time, "
+          f"{used.ru_maxrss * 1024e-9:.2f} GB at most")
+
+
+if __name__ == "__main__":
+    main()
