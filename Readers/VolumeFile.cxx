@@ -61,30 +61,17 @@ void ReverseSlices(char* bytes, std::size_t slice, int slices)
     std::swap_ranges(bytes + front * slice, bytes + (front + 1) * slice, bytes + back * slice);
 }
 
-class HeaderVolume : public VolumeSource {
-public:
-  explicit HeaderVolume(const std::string& path) : VolumeSource(path, FileFormat::Unknown), header_(ReadImageHeader(path))
-  {
-    CheckVolume(header_);
-    content_.format = header_.format;
-    content_.geometry = header_.geometry;
-    content_.type = header_.type;
-    content_.fields = header_.fields;
-    content_.notes = header_.notes;
-  }
+// To the first byte of the data.
+void SeekData(const ImageHeader& header, std::istream& stream)
+{
+  if (header.dataOffset < 0)
+    stream.seekg(-static_cast<std::streamoff>(header.ByteCount()), std::ios::end);
+  else
+    stream.seekg(header.dataOffset);
+}
 
-  void Read(std::size_t, void* voxels, unsigned char*, const Progress& progress) override
-  {
-    ReadVoxels(header_, voxels, progress);
-  }
-
-private:
-  ImageHeader header_;
-};
-
-} // namespace
-
-void CheckVolume(const ImageHeader& header)
+// Checks all of CheckVolume but the memory for the voxels.
+void CheckContent(const ImageHeader& header)
 {
   const std::string& path = header.path;
   if (!header.typeIsKnown)
@@ -102,17 +89,78 @@ void CheckVolume(const ImageHeader& header)
     CheckBytes(header.dataPath, says, bytes, there, header.encoding == ImageHeader::Encoding::Zlib, header.dataOffset >= 0);
   else if ((there + 1.0) / 2.0 < voxels)
     FailFile(header.dataPath, says + " need more numbers than " + NumberText(there) + " characters can hold");
-  CheckMemory(path, bytes);
+}
+
+class HeaderVolume : public VolumeSource {
+public:
+  explicit HeaderVolume(const std::string& path) : VolumeSource(path, FileFormat::Unknown), header_(ReadImageHeader(path))
+  {
+    CheckContent(header_);
+    content_.format = header_.format;
+    content_.geometry = header_.geometry;
+    content_.type = header_.type;
+    content_.fields = header_.fields;
+    content_.notes = header_.notes;
+  }
+
+  void Read(std::size_t, void* voxels, unsigned char*, const Progress& progress) override
+  {
+    ReadVoxels(header_, voxels, progress);
+  }
+
+  bool ReadsSlices() const override { return header_.encoding != ImageHeader::Encoding::Text; }
+
+  void ReadSlices(int first, int count, void* voxels, const Progress& progress) override
+  {
+    ImageHeader part = header_;
+    part.geometry.dimensions[2] = count;
+    const int slices = header_.geometry.dimensions[2], from = header_.reverseSlices ? slices - first - count : first;
+    const std::uint64_t before = header_.ByteCount() / static_cast<std::uint64_t>(slices) * static_cast<std::uint64_t>(from);
+    if (header_.encoding == ImageHeader::Encoding::Raw) {
+      std::ifstream stream = OpenToRead(header_.dataPath);
+      SeekData(header_, stream);
+      stream.seekg(static_cast<std::streamoff>(before), std::ios::cur);
+      if (const std::uint64_t there = ReadPieces(stream, voxels, part.ByteCount(), progress); there < part.ByteCount())
+        FailFile(header_.dataPath, "the data end early, after " + std::to_string(before + there) + " of " +
+                                       std::to_string(header_.ByteCount()) + " bytes");
+    } else {
+      const std::uint64_t position = header_.skipDecoded + before;
+      std::unique_ptr<Inflater> inflater = std::move(inflater_); // gone after an error
+      if (!inflater || inflater->Position() > position) {
+        stream_ = OpenToRead(header_.dataPath);
+        SeekData(header_, stream_);
+        inflater =
+            std::make_unique<Inflater>(stream_, stream_.tellg(), header_.dataPath, header_.skipDecoded + header_.ByteCount());
+      }
+      inflater->Read(nullptr, position - inflater->Position());
+      inflater->Read(voxels, part.ByteCount(), progress);
+      if (from + count == slices)
+        inflater->Finish();
+      else
+        inflater_ = std::move(inflater);
+    }
+    ArrangeVoxels(part, voxels);
+  }
+
+private:
+  ImageHeader header_;
+  std::ifstream stream_; // of compressed data that are read slice by slice
+  std::unique_ptr<Inflater> inflater_;
+};
+
+} // namespace
+
+void CheckVolume(const ImageHeader& header)
+{
+  CheckContent(header);
+  CheckMemory(header.path, static_cast<double>(header.ByteCount()));
 }
 
 void ReadVoxels(const ImageHeader& header, void* voxels, const Progress& progress)
 {
   const std::uint64_t bytes = header.ByteCount();
   std::ifstream stream = OpenToRead(header.dataPath);
-  if (header.dataOffset < 0)
-    stream.seekg(-static_cast<std::streamoff>(bytes), std::ios::end);
-  else
-    stream.seekg(header.dataOffset);
+  SeekData(header, stream);
 
   switch (header.encoding) {
   case ImageHeader::Encoding::Raw:

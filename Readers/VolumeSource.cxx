@@ -11,6 +11,11 @@
 
 namespace echorama {
 
+void VolumeSource::ReadSlices(int, int, void*, const Progress&)
+{
+  Fail("its slices cannot be read one by one");
+}
+
 void VolumeSource::ReadBeams(std::size_t, void*, const Progress&)
 {
   throw Error(Error::Kind::BadInput, content_.path + ": it holds no beams");

@@ -3,6 +3,7 @@
 
 #include "BorderZeros.h"
 #include "Readers/DataFile.h"
+#include "Readers/ImageHeader.h"
 #include "Readers/SequenceFile.h"
 #include "Readers/VolumeFile.h"
 #include "Readers/VolumeSource.h"
@@ -33,6 +34,7 @@ using echorama::Error;
 using echorama::FileFormat;
 using echorama::HeaderField;
 using echorama::VolumeContent;
+using echorama::VolumeSource;
 using echorama::VoxelType;
 
 vtkStandardNewMacro(vtkUltrasoundReader);
@@ -51,12 +53,31 @@ vtkSmartPointer<vtkDataArray> NewArray(VoxelType type, std::size_t count, const 
   return array;
 }
 
+// Throws Error(TooLarge) when so many slices of a volume (all, where it is negative) do not fit in the free memory.
+void CheckRoom(const VolumeContent& content, int slices = -1)
+{
+  const auto& n = content.geometry.dimensions;
+  echorama::CheckMemory(content.path, static_cast<double>(n[0]) * n[1] * (slices < 0 ? n[2] : slices) *
+                                          static_cast<double>(echorama::SizeOf(content.type)));
+}
+
 // Beams as an image: they lie in no space of millimetres, so samples, beams and steps are counted.
 echorama::ImageGeometry BeamGrid(const echorama::BeamContent& beams)
 {
   echorama::ImageGeometry grid;
   grid.dimensions = beams.dimensions;
   return grid;
+}
+
+std::unique_ptr<VolumeSource> OpenCompanion(const std::string& path, const std::string& companion,
+                                            const echorama::ImageGeometry& geometry)
+{
+  auto source = echorama::OpenVolume(companion);
+  if (!source->Content().geometry.AgreesWith(geometry)) {
+    throw Error(Error::Kind::BadFile, companion + ": its geometry is not that of " + path +
+                                          "; remove it if it belongs to an earlier file of this name");
+  }
+  return source;
 }
 
 // The file NAME.array.ext beside NAME.ext, with the same geometry as the volume, or nullptr when there is none.
@@ -68,11 +89,8 @@ vtkSmartPointer<vtkDataArray> ReadCompanion(const std::string& path, const char*
   if (!std::filesystem::exists(companion, ignored)) {
     return nullptr;
   }
-  const auto source = echorama::OpenVolume(companion);
-  if (!source->Content().geometry.AgreesWith(vtkUltrasoundVolume::GeometryOf(volume))) {
-    throw Error(Error::Kind::BadFile, companion + ": its geometry is not that of " + path +
-                                          "; remove it if it belongs to an earlier file of this name");
-  }
+  const auto source = OpenCompanion(path, companion, vtkUltrasoundVolume::GeometryOf(volume));
+  CheckRoom(source->Content());
   auto values = NewArray(source->Content().type, source->Content().geometry.VoxelCount(), array);
   source->Read(0, values->GetVoidPointer(0), nullptr, progress);
   return values;
@@ -106,6 +124,11 @@ vtkSmartPointer<vtkDataArray> AsValidRegion(vtkDataArray* array)
   const auto valid = vtkSmartPointer<vtkUnsignedCharArray>::New();
   valid->SetName(vtkUltrasoundVolume::ValidRegionName());
   valid->SetNumberOfTuples(count);
+  if (auto* bytes = vtkUnsignedCharArray::SafeDownCast(array)) {
+    std::transform(bytes->GetPointer(0), bytes->GetPointer(0) + count, valid->GetPointer(0),
+                   [](unsigned char value) { return static_cast<unsigned char>(value != 0); });
+    return valid;
+  }
   for (vtkIdType i = 0; i < count; ++i) {
     valid->SetValue(i, array->GetComponent(i, 0) != 0.0 ? 1 : 0);
   }
@@ -195,6 +218,22 @@ echorama::ImageGeometry OpenXml(vtkXMLImageDataReader* reader, const std::string
   return geometry;
 }
 } // namespace
+
+//----------------------------------------------------------------------------
+// A volume and its companions, whose slices are asked for in turn.
+struct vtkUltrasoundReader::OpenFiles {
+  std::string Path;
+  vtkMTimeType Made = 0; // of the reader
+  std::filesystem::file_time_type Written;
+  std::unique_ptr<VolumeSource> Main;
+  std::vector<std::pair<const char*, std::unique_ptr<VolumeSource>>> Beside; // the valid region first
+};
+
+//----------------------------------------------------------------------------
+vtkUltrasoundReader::~vtkUltrasoundReader()
+{
+  this->SetFileName(nullptr);
+}
 
 //----------------------------------------------------------------------------
 vtkUltrasoundReader::vtkUltrasoundReader()
@@ -311,6 +350,10 @@ void vtkUltrasoundReader::Execute(vtkInformationVector**, vtkImageData* output, 
 {
   this->Notes.clear();
   const std::string path = this->FileName ? this->FileName : "";
+  if (this->ReadSlices(output, progress)) {
+    return;
+  }
+  this->Opened.reset();
   if (echorama::FormatOfContent(path) == FileFormat::VtkXmlImage) {
     this->ReadXml(output);
     progress(0.7); // VTK's reader cannot be stopped, but we can
@@ -322,6 +365,80 @@ void vtkUltrasoundReader::Execute(vtkInformationVector**, vtkImageData* output, 
 }
 
 //----------------------------------------------------------------------------
+// Reads the slices that are asked for, when these are not all and the file lets it. Without a file of the valid region that has
+// to be guessed, from the whole.
+bool vtkUltrasoundReader::ReadSlices(vtkImageData* output, const echorama::Progress& progress)
+{
+  const std::string path = this->FileName ? this->FileName : "";
+  vtkInformation* out = this->GetOutputInformation(0);
+  if (!out->Has(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT())) {
+    return false;
+  }
+  int whole[6], wanted[6];
+  out->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), whole);
+  out->Get(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT(), wanted);
+  if (wanted[4] > wanted[5] || wanted[4] < whole[4] || wanted[5] > whole[5] || (wanted[4] == whole[4] && wanted[5] == whole[5])) {
+    return false;
+  }
+  const int slices = wanted[5] - wanted[4] + 1;
+
+  // 1. what there is, opened now or for the slices before
+  std::error_code ignored;
+  const auto written = std::filesystem::last_write_time(path, ignored);
+  if (!this->Opened || this->Opened->Path != path || this->Opened->Made != this->GetMTime() || this->Opened->Written != written) {
+    this->Opened.reset();
+    if (echorama::FormatOfContent(path) == FileFormat::VtkXmlImage) {
+      return false;
+    }
+    auto opened = std::make_unique<OpenFiles>();
+    opened->Path = path;
+    opened->Made = this->GetMTime();
+    opened->Written = written;
+    opened->Main = echorama::OpenVolume(path, this->Values);
+    std::vector<const char*> names{vtkUltrasoundVolume::ValidRegionName()};
+    names.insert(names.end(), echorama::CompanionArrays.begin(), echorama::CompanionArrays.end());
+    for (const char* name : names) {
+      const std::string companion = echorama::CompanionPath(path, name);
+      if (std::filesystem::exists(companion, ignored)) {
+        opened->Beside.emplace_back(name, OpenCompanion(path, companion, opened->Main->Content().geometry));
+      }
+    }
+    const bool all =
+        std::all_of(opened->Beside.begin(), opened->Beside.end(), [](const auto& each) { return each.second->ReadsSlices(); });
+    if (!all || !opened->Main->ReadsSlices() || opened->Beside.empty() || opened->Beside.front().first != names.front()) {
+      return false;
+    }
+    this->Opened = std::move(opened);
+  }
+
+  // 2. their slices; after a failure the files are opened anew
+  std::unique_ptr<OpenFiles> files = std::move(this->Opened);
+  const VolumeContent& content = files->Main->Content();
+  this->Notes = content.notes;
+  vtkUltrasoundVolume::SetGeometry(output, content.geometry);
+  output->SetExtent(whole[0], whole[1], whole[2], whole[3], wanted[4], wanted[5]);
+  const auto read = [&](VolumeSource& source, const char* name, const echorama::Progress& part) {
+    CheckRoom(source.Content(), slices);
+    const auto values = NewArray(source.Content().type, static_cast<std::size_t>(output->GetNumberOfPoints()), name);
+    source.ReadSlices(wanted[4] - whole[4], slices, values->GetVoidPointer(0), part);
+    return values;
+  };
+  output->GetPointData()->SetScalars(read(*files->Main, vtkUltrasoundVolume::IntensityName(), progress.Part(0.0, 0.7)));
+  const double each = 0.3 / static_cast<double>(files->Beside.size());
+  double done = 0.7;
+  for (const auto& [name, source] : files->Beside) {
+    const auto values = read(*source, name, progress.Part(done, done + each));
+    done += each;
+    output->GetPointData()->AddArray(&source == &files->Beside.front().second ? AsValidRegion(values) : values);
+  }
+  this->SetFields(content, output);
+  if (wanted[5] < whole[5]) {
+    this->Opened = std::move(files);
+  }
+  return true;
+}
+
+//----------------------------------------------------------------------------
 void vtkUltrasoundReader::ReadSource(vtkImageData* output, const echorama::Progress& progress)
 {
   const auto source = echorama::OpenVolume(this->FileName, this->Values);
@@ -329,6 +446,7 @@ void vtkUltrasoundReader::ReadSource(vtkImageData* output, const echorama::Progr
   this->Notes = content.notes;
   const std::size_t index = SetTime(content, this->GetOutputInformation(0), output);
   vtkUltrasoundVolume::SetGeometry(output, content.geometry);
+  CheckRoom(content);
   const auto intensity = NewArray(content.type, content.geometry.VoxelCount(), vtkUltrasoundVolume::IntensityName());
   vtkSmartPointer<vtkUnsignedCharArray> valid;
   if (content.holdsValidRegion) {

@@ -24,7 +24,9 @@
  * its files, and has no pose.
  *
  * A 2D image is a volume of one slice. Where the axes of a file are left-handed the slices are taken in reverse, so that the
- * geometry is a rigid pose. The header alone is read until voxels are asked for.
+ * geometry is a rigid pose. The header alone is read until voxels are asked for. Where only some slices are asked for
+ * (UPDATE_EXTENT), only these are read of MetaImage and NRRD with a file of their valid region, however large these are; a part
+ * of any other file is cut out of the whole.
  *
  * Refused, with a message that names file and reason: files that are truncated, empty, damaged or of another type; sizes that
  * do not fit the data or the memory; a spacing that is not positive; a direction that is singular or sheared; numbers that are
@@ -39,6 +41,7 @@
 #include "vtkUltrasoundImageAlgorithm.h"
 #include "vtkUltrasoundParameters.h"
 
+#include <memory> // for open files
 #include <string> // for the notes
 #include <vector> // for the notes
 
@@ -99,10 +102,7 @@ public:
 
 protected:
   vtkUltrasoundReader();
-  ~vtkUltrasoundReader() override
-  {
-    this->SetFileName(nullptr);
-  }
+  ~vtkUltrasoundReader() override;
 
   int ProcessRequest(vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
   int RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
@@ -120,6 +120,7 @@ private:
 
 #ifndef __VTK_WRAP__
   void ReadSource(vtkImageData* output, const echorama::Progress& progress);
+  bool ReadSlices(vtkImageData* output, const echorama::Progress& progress);
   void ReadBeams(vtkImageData* output, const echorama::Progress& progress);
   void SetFields(const echorama::VolumeContent& content, vtkImageData* output);
   void ReadXml(vtkImageData* output);
@@ -128,6 +129,8 @@ private:
 
   echorama::VolumeReadParameters Values;
   std::vector<std::string> Notes;
+  struct OpenFiles;
+  std::unique_ptr<OpenFiles> Opened; // while some slices after others are asked for
 #endif
 };
 

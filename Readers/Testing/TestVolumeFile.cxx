@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/ByteOrder.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
@@ -254,6 +255,50 @@ TEST_F(VolumeFile, MoreThanTheMemoryIsRefused)
   if (error)
     GTEST_SKIP() << "this file system holds no sparse files of 8 TB";
   ExpectRefused([&] { CheckVolume(ReadImageHeader(path)); }, Error::Kind::TooLarge, path, "memory");
+}
+
+TEST_F(VolumeFile, SlicesAreThoseOfTheWhole)
+{
+  ImageHeader header;
+  header.type = VoxelType::UInt16;
+  header.geometry.dimensions = {7, 5, 11};
+  const std::size_t slice = 7 * 5;
+  const std::vector<std::uint16_t> written = Values<std::uint16_t>(slice * 11);
+  std::vector<std::string> files{"a.mha", "b.mha", "a.mhd", "b.nrrd", "a.nhdr"};
+  for (const std::string& name : files)
+    Write(name, header, written.data(), name[0] == 'a');
+  // Left-handed, so that slices are taken in reverse, and of the other byte order; plain and compressed, before the end of the
+  // file.
+  std::string bytes(reinterpret_cast<const char*>(written.data()), written.size() * 2);
+  for (std::size_t at = 0; at < bytes.size(); at += 2)
+    std::swap(bytes[at], bytes[at + 1]);
+  const std::string left = "NDims = 3\nTransformMatrix = 1 0 0 0 1 0 0 0 -1\nDimSize = 7 5 11\nElementType = MET_USHORT\n"
+                           "BinaryDataByteOrderMSB = " +
+                           std::string(HostIsBigEndian ? "False" : "True") + "\n";
+  Put("left.mha", left + "ElementDataFile = LOCAL\n" + bytes);
+  Put("packed.mha", left + "CompressedData = True\nElementDataFile = LOCAL\n" + Zlib(bytes));
+  Put("left.mhd", left + "HeaderSize = -1\nElementDataFile = left.raw\n");
+  Put("left.raw", "leading bytes" + bytes);
+  for (const char* name : {"left.mha", "packed.mha", "left.mhd"})
+    files.push_back(name);
+  for (const std::string& name : files) {
+    SCOPED_TRACE(name);
+    const std::vector<std::uint16_t> whole = Read<std::uint16_t>(name);
+    EXPECT_EQ(whole == written, name.substr(0, 4) != "left" && name[0] != 'p');
+    const auto source = OpenVolume(Path(name));
+    ASSERT_TRUE(source->ReadsSlices());
+    for (const auto& [first, count] : {std::pair{0, 2}, {2, 3}, {5, 6}, {4, 1}, {10, 1}, {0, 11}, {3, 3}}) { // on, back, and over
+      std::vector<std::uint16_t> part(slice * static_cast<std::size_t>(count) + 1, 4711);
+      source->ReadSlices(first, count, part.data());
+      EXPECT_TRUE(std::equal(part.begin(), part.end() - 1, whole.begin() + static_cast<std::ptrdiff_t>(slice) * first))
+          << first << " " << count;
+      EXPECT_EQ(part.back(), 4711);
+    }
+  }
+  Put("text.nrrd", "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 1 1 2\nencoding: ascii\n\n1 2\n");
+  const auto text = OpenVolume(Path("text.nrrd"));
+  EXPECT_FALSE(text->ReadsSlices());
+  EXPECT_THROW(text->ReadSlices(0, 1, nullptr), Error);
 }
 
 TEST_F(VolumeFile, AFullDiskLeavesWhatWasThere)
