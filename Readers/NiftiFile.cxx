@@ -98,9 +98,18 @@ public:
     stored_.path = path;
     ReadHeader();
   }
-  void Read(std::size_t index, void* voxels, unsigned char* valid, const Progress& progress) override;
+  void Read(std::size_t index, void* voxels, unsigned char*, const Progress& progress) override
+  {
+    ReadPart(index, 0, stored_.geometry.dimensions[2], voxels, progress);
+  }
+  bool ReadsSlices() const override { return true; }
+  void ReadSlices(int first, int count, void* voxels, const Progress& progress) override
+  {
+    ReadPart(0, first, count, voxels, progress);
+  }
 
 private:
+  void ReadPart(std::size_t index, int first, int slices, void* voxels, const Progress& progress);
   void ReadHeader();
   void ReadDimensions(const NiftiHeader& fields);
   void ReadTimes(const NiftiHeader& fields);
@@ -401,24 +410,29 @@ void NiftiSource::CheckSizes()
   PlainOrGzip& data = Data();
   CheckBytes(stored_.dataPath, says, bytes, data.FileBytes(), data.Compressed(), true);
   data.SetTotal(static_cast<std::uint64_t>(bytes));
-  CheckMemory(content_.path, voxels * static_cast<double>(SizeOf(content_.type)));
 }
 
-void NiftiSource::Read(std::size_t index, void* voxels, unsigned char*, const Progress& progress)
+// Some slices of a volume.
+void NiftiSource::ReadPart(std::size_t index, int first, int slices, void* voxels, const Progress& progress)
 {
-  const std::uint64_t bytes = stored_.ByteCount(), begin = static_cast<std::uint64_t>(offset_) + index * bytes;
-  const std::size_t count = stored_.geometry.VoxelCount();
+  ImageHeader part = stored_;
+  part.geometry.dimensions[2] = slices;
+  const int all = stored_.geometry.dimensions[2], from = stored_.reverseSlices ? all - first - slices : first;
+  const std::uint64_t bytes = part.ByteCount();
+  const std::uint64_t begin = static_cast<std::uint64_t>(offset_) + index * stored_.ByteCount() +
+                              stored_.ByteCount() / static_cast<std::uint64_t>(all) * static_cast<std::uint64_t>(from);
+  const std::size_t count = part.geometry.VoxelCount();
   const bool scaled = slope_ != 1.0 || intercept_ != 0.0;
   char* const target = static_cast<char*>(voxels) + (scaled ? count * SizeOf(content_.type) - bytes : 0);
   try {
     Data().Read(begin, target, bytes, progress);
-    if (index + 1 == content_.Volumes())
+    if (index + 1 == content_.Volumes() && from + slices == all)
       data_->Finish();
   } catch (...) {
     data_.reset(); // it cannot go on from here
     throw;
   }
-  ArrangeVoxels(stored_, target);
+  ArrangeVoxels(part, target);
   if (scaled)
     DispatchVoxelType(stored_.type, [&](auto zero) {
       using Stored = decltype(zero);

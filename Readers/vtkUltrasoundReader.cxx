@@ -405,7 +405,8 @@ bool vtkUltrasoundReader::ReadSlices(vtkImageData* output, const echorama::Progr
     }
     const bool all =
         std::all_of(opened->Beside.begin(), opened->Beside.end(), [](const auto& each) { return each.second->ReadsSlices(); });
-    if (!all || !opened->Main->ReadsSlices() || opened->Beside.empty() || opened->Beside.front().first != names.front()) {
+    if (!all || !opened->Main->ReadsSlices() || !opened->Main->Content().times.empty() || opened->Beside.empty() ||
+        opened->Beside.front().first != names.front()) {
       return false;
     }
     this->Opened = std::move(opened);

@@ -25,8 +25,8 @@
  *
  * A 2D image is a volume of one slice. Where the axes of a file are left-handed the slices are taken in reverse, so that the
  * geometry is a rigid pose. The header alone is read until voxels are asked for. Where only some slices are asked for
- * (UPDATE_EXTENT), only these are read of MetaImage and NRRD with a file of their valid region, however large these are; a part
- * of any other file is cut out of the whole.
+ * (UPDATE_EXTENT), only these are read of MetaImage, NRRD and NIfTI with a file of their valid region, however large these are; a
+ * part of any other file is cut out of the whole.
  *
  * Refused, with a message that names file and reason: files that are truncated, empty, damaged or of another type; sizes that
  * do not fit the data or the memory; a spacing that is not positive; a direction that is singular or sheared; numbers that are

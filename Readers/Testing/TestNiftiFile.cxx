@@ -270,6 +270,35 @@ TEST_F(NiftiFile, UnitsOfLength)
   Refused(file, "unit of length");
 }
 
+TEST_F(NiftiFile, SlicesAreThoseOfTheWhole)
+{
+  ByHand file;
+  file.dim = {3, 3, 2, 9, 1, 1, 1, 1};
+  file.datatype = 512; // unsigned short
+  for (const bool big : {false, true})
+    for (const float z : {1.0f, -1.0f}) // left-handed: slices are taken in reverse
+      for (const float slope : {0.0f, 0.5f}) {
+        file.big = big;
+        file.slope = slope;
+        file.srow[10] = z;
+        file.data.clear();
+        for (int i = 0; i < 54; ++i)
+          file.data += file.Number(static_cast<unsigned short>(1000 + 7 * i));
+        DispatchVoxelType(slope > 0.0f ? VoxelType::Float32 : VoxelType::UInt16, [&](auto zero) {
+          using T = decltype(zero);
+          const auto source = OpenNifti(Put(file));
+          const std::vector<T> whole = Voxels<T>(*source);
+          ASSERT_TRUE(source->ReadsSlices());
+          for (const auto& [first, count] : {std::pair{0, 2}, {2, 3}, {8, 1}, {5, 4}, {0, 9}}) {
+            std::vector<T> part(6 * static_cast<std::size_t>(count) + 1, T(4711));
+            source->ReadSlices(first, count, part.data(), {});
+            EXPECT_TRUE(std::equal(part.begin(), part.end() - 1, whole.begin() + 6 * first)) << first << " " << count;
+            EXPECT_EQ(part.back(), T(4711));
+          }
+        });
+      }
+}
+
 TEST_F(NiftiFile, StoredNumbersAreScaled)
 {
   ByHand file;
