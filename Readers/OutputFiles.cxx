@@ -130,12 +130,9 @@ OutputFolder::OutputFolder(const std::string& path, const std::vector<std::strin
     else if (error)
       Fail(folder_, "the folder cannot be made: " + error.message());
   }
-  // Of this machine: others may write to a shared folder at the same time, and their processes are not known here.
   if (access(folder_.c_str(), W_OK | X_OK) != 0)
     Fail(folder_, std::string("the folder cannot be written in: ") + std::strerror(errno));
-  char machine[65] = "";
-  gethostname(machine, sizeof machine - 1);
-  stage_ = place_.Stage((folder_ / (std::string(machine) + ".files")).string());
+  stage_ = place_.Stage((folder_ / ".files").string());
   std::error_code error;
   fs::remove(stage_, error);
   if (!fs::create_directory(stage_, error))
@@ -161,14 +158,19 @@ std::string OutputFolder::Stage(const std::string& name)
 
 void OutputFolder::Commit()
 {
-  FileReplacement replacement;
+  FileReplacement none;
+  Commit(none);
+}
+
+void OutputFolder::Commit(FileReplacement& others)
+{
   for (const std::string& name : names_)
     for (const std::string& companion : CompanionPaths(name)) // of an earlier file of this name
       if (!fs::exists(stage_ / companion))
-        replacement.Remove((folder_ / companion).string());
+        others.Remove((folder_ / companion).string());
   for (const auto& entry : fs::directory_iterator(stage_))
-    fs::rename(entry.path(), replacement.Stage(Final(entry.path().filename().string())));
-  replacement.Commit();
+    fs::rename(entry.path(), others.Stage(Final(entry.path().filename().string())));
+  others.Commit();
   made_.clear();
 }
 

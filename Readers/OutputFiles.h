@@ -49,6 +49,9 @@ public:
   /// Moves all to their places.
   void Commit();
 
+  /// The same together with the files of \a others: all of them, or none.
+  void Commit(FileReplacement& others);
+
 private:
   std::vector<std::string> inputs_, names_;
   FileReplacement place_; ///< what gives stage_ its name, and removes what a killed process left of that name

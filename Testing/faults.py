@@ -36,7 +36,7 @@ SOURCE = pathlib.Path(__file__).resolve().parents[1]
 PAGE = SOURCE / "Documentation" / "faults.md"
 TABLE = re.compile(r"(<!-- faults -->\n).*?(<!-- end faults -->)", re.S)
 FAULTS = {"kill": "`kill -9`", "full": "full disk", "readonly": "read-only folder", "gone": "vanished share"}
-HIDDEN = re.compile(r"(?:^|/)\.(old|part)\d+-\d+-(.+)")  # the rest: a file, or one in a folder
+HIDDEN = re.compile(r"(?:^|/)\.(old|part)\d+-\d+@[^@/]*@(.+)")  # the rest: a file, or one in a folder
 CHANGES = ("openat", "write", "pwrite64", "writev", "ftruncate", "rename", "renameat", "renameat2", "link", "linkat", "unlink", "unlinkat", "mkdir",
            "mkdirat", "rmdir", "fsync", "copy_file_range", "sendfile")
 REASONS = {"full": r"[Dd]isk (is )?full|No space left|out of disk space|cannot be written", "readonly": r"[Rr]ead-only|cannot be written", "gone": r"No such file|is no folder|not there|no folder"}
@@ -48,7 +48,6 @@ class Command:
     make: object  # (folder of inputs, output folder, 0 or 1): arguments of the old and the new run
     python: bool = False
     statuses: tuple = (0,)
-    apart: bool = False  # each folder is a set of its own: they take their places one after the other
 
 
 def program(build):
@@ -72,8 +71,9 @@ COMMANDS = [
     Command("convert, a sequence", lambda i, o, n: ["convert", i / f"track_{n}.igs.mha", o / "out.seq.nrrd"]),
     Command("reconstruct", lambda i, o, n: ["reconstruct", i / f"track_{n}.igs.mha", "-o", o / "out.nii.gz", "--between", "nothing", "--spacing", 1]),
     Command("align", lambda i, o, n: ["align", i / "volume_1.mha", i / "volume_2.mha", "-o", o / "poses.json", "--apply", o / "moved", "--fixed", n + 1],
-            statuses=(0, 3), apart=True),
-    Command("align --deformable", lambda i, o, n: ["align", i / "volume_1.mha", i / "volume_2.mha", "-o", o / "poses.json", "--deformable", "--fixed", n + 1],
+            statuses=(0, 3)),
+    Command("align --deformable", lambda i, o, n: ["align", i / "volume_1.mha", i / "volume_2.mha", "-o", o / "poses.json", "--deformable", "--minimum-gain", 0,
+                                              "--bending-weight", 1 + n],
             statuses=(0, 3)),
     Command("stitch", lambda i, o, n: ["stitch", i / "volume_1.mha", i / "volume_2.mha", "-o", o / "out.mha", "--uncertainty", "--spacing", 4 + n]),
     Command("embed", lambda i, o, n: ["embed", i / "volume_1.mha", "-o", o / "out.nrrd", "--preview", 3 + n]),
@@ -256,10 +256,6 @@ class Bench:
                 raise Wrong(f"{name} is lost; there are {sorted(left)}")
         if aside and all(text in (staged.get(name), shown.get(name)) for name, text in self.new.items()):
             return "aside"
-        folders = {os.path.dirname(name) for name in (*self.old, *self.new)}
-        part = lambda files, folder: {name: text for name, text in files.items() if os.path.dirname(name) == folder}
-        if self.command.apart and all(part(shown, folder) in (part(self.old, folder), part(self.new, folder)) for folder in folders):
-            return "apart"
         raise Wrong(f"neither the old nor the new set: {sorted(left)}")
 
     def refused(self, done, fault):
@@ -374,7 +370,7 @@ class Bench:
 
 
 def told(outcomes):
-    return ", ".join(f"{outcomes.count(kind)} {kind}" for kind in ("old", "new", "aside", "apart") if kind in outcomes)
+    return ", ".join(f"{outcomes.count(kind)} {kind}" for kind in ("old", "new", "aside") if kind in outcomes)
 
 
 def table(build, names, faults, moments, seed, say=print):

@@ -75,6 +75,24 @@ void TellPlan(Session& session, std::size_t volumes, const AlignVolumesPlan& pla
               Fixed(plan.secondsPerVolume, 2) + " s to prepare a volume), and more for pairs that are tried again");
 }
 
+// Poses, what they name and the moved volumes: all take their places, or none does.
+void Write(Session& session, const AlignOptions& options, const std::vector<LoadedVolume>& volumes,
+           const std::vector<std::string>& places, std::vector<VolumePose> poses, FileReplacement& files, OutputFolder* folder)
+{
+  for (std::size_t i = 0; i < places.size(); ++i)
+    SaveVolume(session, volumes[i].image, places[i]);
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    if (!poses[i].displacement.empty()) // as it will be named
+      poses[i].displacement = DisplacementPath(options.output, i);
+  const std::string staged = files.Stage(options.output);
+  session.ShowAs(staged, options.output);
+  WritePoses(staged, poses);
+  if (folder)
+    folder->Commit(files);
+  else
+    files.Commit();
+}
+
 void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner, vtkUltrasoundDeformableAligner* deformer)
 {
   options.files = WithoutCompanions(session, options.files);
@@ -117,6 +135,7 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
     for (const std::string& file : options.files)
       places.push_back(folder->Stage(std::filesystem::path(file).filename().string()));
   }
+  FileReplacement files; // all that is written takes its place together
 
   std::vector<LoadedVolume> volumes = LoadVolumes(session, options.files);
   ApplyPoses(session, volumes, options.poses);
@@ -131,11 +150,7 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
       poses.push_back({volume.file, volume.geometry, volume.volumeToWorld});
       session.result["volumes"].push_back({{"file", volume.file}, {"VolumeToWorld", JsonOf(volume.volumeToWorld)}});
     }
-    for (std::size_t i = 0; i < places.size(); ++i)
-      SaveVolume(session, volumes[i].image, places[i]);
-    WritePoses(options.output, poses);
-    if (folder)
-      folder->Commit();
+    Write(session, options, volumes, places, poses, files, folder.get());
     session.Say("wrote " + options.output + ", as the tracker says");
     return;
   }
@@ -185,7 +200,7 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
   }
 
   if (options.deformable)
-    DeformVolumes(session, deformer, volumes, isPlaced, options.fixed - 1, options.output, poses);
+    DeformVolumes(session, deformer, volumes, isPlaced, options.fixed - 1, options.output, files, poses);
   if (!landmarks.empty()) {
     for (std::size_t i = 0; i < volumes.size(); ++i) {
       landmarks[i].volumeToWorld = volumes[i].volumeToWorld;
@@ -193,12 +208,9 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
     }
     TellLandmarkError(session, landmarks, options.files);
   }
-  for (std::size_t i = 0; i < places.size(); ++i)
-    SaveVolume(session, volumes[i].image, places[i]);
-  WritePoses(options.output, poses);
+  Write(session, options, volumes, places, poses, files, folder.get());
   session.Say("wrote " + options.output);
-  if (folder) { // the volumes have waited for the poses: both are there, or none
-    folder->Commit();
+  if (folder) {
     session.result["applied"] = options.apply;
     session.Say("wrote " + std::to_string(volumes.size()) + " volumes with their new geometry to " + options.apply);
   }

@@ -2,7 +2,6 @@
 // Displacements are files of their own beside the poses: images that ParaView and other programs of VTK read as they are.
 #include "Displacements.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/FileReplacement.h"
 #include <algorithm>
 #include <filesystem>
 #include <vtkInformation.h>
@@ -38,14 +37,12 @@ std::optional<DisplacementField> DisplacementOf(Session& session, const VolumePo
 
 void WriteDisplacement(vtkImageData* image, const std::string& path)
 {
-  FileReplacement files;
   const vtkNew<vtkXMLImageDataWriter> writer;
   writer->SetInputData(image);
-  writer->SetFileName(files.Stage(path).c_str());
+  writer->SetFileName(path.c_str());
   writer->SetDataModeToBinary();
   if (!writer->Write())
     throw Error(Error::Kind::FileSystem, path + ": it cannot be written");
-  files.Commit();
 }
 
 std::string DisplacementPath(const std::string& poses, std::size_t number)
@@ -55,7 +52,8 @@ std::string DisplacementPath(const std::string& poses, std::size_t number)
 }
 
 void DeformVolumes(Session& session, vtkUltrasoundDeformableAligner* aligner, const std::vector<LoadedVolume>& volumes,
-                   const std::vector<bool>& aligned, int fixed, const std::string& output, std::vector<VolumePose>& poses)
+                   const std::vector<bool>& aligned, int fixed, const std::string& output, FileReplacement& files,
+                   std::vector<VolumePose>& poses)
 {
   std::vector<LoadedVolume> placed;
   std::vector<std::size_t> numbers;
@@ -86,11 +84,13 @@ void DeformVolumes(Session& session, vtkUltrasoundDeformableAligner* aligner, co
                                 {"smallest_determinant", found.smallestDeterminant},
                                 {"bending_mm", found.bendingEnergy}};
     if (found.isApplied) {
-      poses[number].displacement = DisplacementPath(output, number);
+      const std::string place = DisplacementPath(output, number);
+      poses[number].displacement = files.Stage(place);
+      session.ShowAs(poses[number].displacement, place);
       WriteDisplacement(
           vtkImageData::SafeDownCast(vtkMultiBlockDataSet::SafeDownCast(aligner->GetOutputDataObject(1))->GetBlock(block)),
           poses[number].displacement);
-      told["file"] = poses[number].displacement;
+      told["file"] = place;
     }
     session.result["volumes"][number]["deformation"] = told;
     session.Say(volumes[number].file + ": " +

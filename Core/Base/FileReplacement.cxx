@@ -24,22 +24,35 @@ namespace {
   throw Error(Error::Kind::FileSystem, path + ": " + reason);
 }
 
-// A name beside the target that nobody else uses. The extension stays at the end, because writers look at it.
+// Whose processes these numbers are of: others may write to a shared folder at the same time.
+std::string Machine()
+{
+  char name[65] = "";
+  gethostname(name, sizeof name - 1);
+  for (char& c : name)
+    if (c == '/' || c == '@') // the system does not mind
+      c = '_';
+  return name;
+}
+
+// A name beside the target that nobody else uses: .part4711-2@machine@NAME. The extension stays at the end, because writers look
+// at it.
 std::string NameBeside(const fs::path& target, const char* purpose)
 {
   static std::atomic<unsigned> counter{0};
-  const std::string name = target.filename().string(),
-                    mark = "." + std::string(purpose) + std::to_string(getpid()) + "-" + std::to_string(counter++) + "-";
+  const std::string name = target.filename().string(), mark = "." + std::string(purpose) + std::to_string(getpid()) + "-" +
+                                                              std::to_string(counter++) + "@" + Machine() + "@";
   return (target.parent_path() / (mark + name.substr(name.size() - std::min(name.size(), 255 - mark.size())))).string();
 }
 
-// Removes what processes that were killed left beside the target under such names.
+// Removes what processes of this machine that were killed left beside the target under such names.
 void RemoveAbandoned(const fs::path& target, const std::string& purpose)
 {
+  const std::string rest = "@" + Machine() + "@" + target.filename().string();
   std::error_code error;
   for (fs::directory_iterator entry(target.parent_path() / ".", error), end; !error && entry != end; entry.increment(error))
     if (const std::string name = entry->path().filename().string();
-        name.rfind("." + purpose, 0) == 0 && name.substr(name.find('-', name.find('-') + 1) + 1) == target.filename() &&
+        name.rfind("." + purpose, 0) == 0 && name.substr(std::min(name.find('@'), name.size())) == rest &&
         kill(std::atoi(name.c_str() + 1 + purpose.size()), 0) != 0 && errno == ESRCH)
       fs::remove_all(entry->path(), error);
 }

@@ -128,11 +128,11 @@ TEST_F(FileReplacementTest, ALinkInTheTemporaryPlaceIsNotFollowed)
 {
   Put(Path("victim"), "untouched");
   FileReplacement first, second;
-  const std::string name = fs::path(first.Stage(Path("a"))).filename().string(); // .partPID-NUMBER-a
-  const std::size_t dash = name.find('-');
+  const std::string name = fs::path(first.Stage(Path("a"))).filename().string(); // .partPID-NUMBER@MACHINE@a
+  const std::size_t dash = name.find('-'), at = name.find('@');
   const int number = std::stoi(name.substr(dash + 1));
   for (int next = number + 1; next < number + 4; ++next)
-    fs::create_symlink("victim", Path(name.substr(0, dash + 1) + std::to_string(next) + "-a"));
+    fs::create_symlink("victim", Path(name.substr(0, dash + 1) + std::to_string(next) + name.substr(at)));
   Put(second.Stage(Path("a")), "new");
   second.Commit();
   EXPECT_EQ(Contents()["victim"], "untouched");
@@ -146,22 +146,36 @@ TEST_F(FileReplacementTest, WhatKilledProcessesLeftIsRemoved)
     _exit(0);
   ASSERT_EQ(waitpid(child, nullptr, 0), child);
   const std::string dead = std::to_string(child), alive = std::to_string(getppid());
-  const auto name = [&](const char* purpose, const std::string& process, const char* rest) {
+  char machine[65] = "";
+  ASSERT_EQ(gethostname(machine, sizeof machine - 1), 0);
+  const std::string here = "@" + std::string(machine) + "@", elsewhere = "@another" + here.substr(1);
+  const auto name = [&](const char* purpose, const std::string& process, const std::string& rest) {
     return "." + (purpose + process) + rest;
   };
   Put(Path("a.txt"), "old");
-  const std::string stays[] = {name("part", alive, "-0-a.txt"), name("part", dead, "-0-b.txt"), name("part", dead, "-0-b-a.txt"),
-                               name("old", dead, "-1-b-a.txt"), name("old", alive, "-1-a.txt"), ".partial-a.txt",
-                               ".part" + dead + "-a.txt",       "part" + dead + "-0-a.txt"};
+  const std::string stays[] = {name("part", alive, "-0" + here + "a.txt"),
+                               name("part", dead, "-0" + here + "b.txt"),
+                               name("part", dead, "-0" + here + "b@a.txt"),
+                               name("old", dead, "-1" + here + "b-a.txt"),
+                               name("old", alive, "-1" + here + "a.txt"),
+                               name("part", dead, "-0" + elsewhere + "a.txt"),
+                               name("old", dead, "-1" + elsewhere + "a.txt"),
+                               name("part", dead, "-0@@a.txt"),
+                               name("part", dead, "-0-a.txt"),
+                               ".partial-a.txt",
+                               ".part" + dead + "-a.txt",
+                               "part" + dead + "-0" + here + "a.txt"};
   for (const std::string& each : stays)
     Put(Path(each), "stays");
-  Put(Path(name("part", dead, "-3-a.txt")), "half");
-  Put(Path(name("old", dead, "-4-a.txt")), "aside");
+  Put(Path(name("part", dead, "-3" + here + "a.txt")), "half");
+  Put(Path(name("old", dead, "-4" + here + "a.txt")), "aside");
   {
     FileReplacement replacement;
-    Put(replacement.Stage(Path("a.txt")), "new");
-    EXPECT_FALSE(fs::exists(Path(name("part", dead, "-3-a.txt"))));
-    EXPECT_TRUE(fs::exists(Path(name("old", dead, "-4-a.txt")))) << "it may be all that is left of the old file";
+    const std::string staged = replacement.Stage(Path("a.txt"));
+    EXPECT_NE(staged.find(here + "a.txt"), std::string::npos) << staged;
+    Put(staged, "new");
+    EXPECT_FALSE(fs::exists(Path(name("part", dead, "-3" + here + "a.txt"))));
+    EXPECT_TRUE(fs::exists(Path(name("old", dead, "-4" + here + "a.txt")))) << "it may be all that is left of the old file";
     replacement.Commit();
   }
   Files expected{{"a.txt", "new"}};

@@ -91,6 +91,32 @@ TEST_F(OutputFiles, AFolderOfFilesAppearsWholeOrNotAtAll)
   EXPECT_FALSE(fs::exists(place + "/a.ValidRegion.mha")); // it belonged to the earlier one
 }
 
+TEST_F(OutputFiles, AFolderAndOtherFilesTakeTheirPlacesTogether)
+{
+  const std::string place = Path("set"), poses = Put("poses.json", "old");
+  fs::create_directory(place);
+  Put("set/a.mha", "old");
+  Put("set/a.ValidRegion.mha", "old");
+  for (const bool fails : {true, false}) {
+    OutputFolder set(place, {});
+    FileReplacement files;
+    WriteTextFile(set.Stage("a.mha"), "new");
+    const std::string staged = files.Stage(poses);
+    WriteTextFile(staged, "new");
+    EXPECT_EQ(ReadTextFile(poses) + ReadTextFile(place + "/a.mha"), "oldold");
+    if (fails) {
+      fs::remove(staged); // so it cannot be put in place
+      EXPECT_NE(Refusal([&] { set.Commit(files); }), "");
+      EXPECT_EQ(ReadTextFile(poses) + ReadTextFile(place + "/a.mha") + ReadTextFile(place + "/a.ValidRegion.mha"), "oldoldold");
+    } else {
+      set.Commit(files);
+      EXPECT_EQ(ReadTextFile(poses) + ReadTextFile(place + "/a.mha"), "newnew");
+      EXPECT_FALSE(fs::exists(place + "/a.ValidRegion.mha"));
+    }
+  }
+  EXPECT_EQ(Names(), (std::vector<std::string>{"poses.json", "set", "set/a.mha"}));
+}
+
 TEST_F(OutputFiles, AFileIsWrittenWholeOrLeftAsItWas)
 {
   const std::string path = Put("text", "old");
