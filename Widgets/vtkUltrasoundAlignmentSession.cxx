@@ -415,7 +415,8 @@ bool vtkUltrasoundAlignmentSession::OpenProject(const char* path, vtkMultiBlockD
     if (stamp.number > 0) {
       this->Storage.Recovered(name);
     } else {
-      this->Storage.Opened(name, this->Now(), fingerprint);
+      project.state = this->Images->State();
+      this->Storage.Opened(name, project, fingerprint);
     }
   };
   const bool opened = this->Change(open, "Open");

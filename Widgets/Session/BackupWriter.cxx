@@ -47,7 +47,10 @@ struct BackupWriter::Parts {
 
   Worker disk, worker; // the last members: they end before the others go
 
-  Parts(const std::string& folder, double seconds, int keep) : backups(folder, keep), interval(seconds) {}
+  Parts(const std::string& folder, LastBackup after, double seconds, int keep)
+    : backups(folder, std::move(after), keep), interval(seconds)
+  {
+  }
 
   void Write(const Item& item)
   {
@@ -139,8 +142,8 @@ struct BackupWriter::Parts {
   }
 };
 
-BackupWriter::BackupWriter(const std::string& folder, double interval, int keep)
-  : parts_(std::make_unique<Parts>(folder, interval, keep))
+BackupWriter::BackupWriter(const std::string& folder, LastBackup after, double interval, int keep)
+  : parts_(std::make_unique<Parts>(folder, std::move(after), interval, keep))
 {
 }
 

@@ -15,7 +15,7 @@ namespace echorama {
 class BackupWriter {
 public:
   /// \param interval seconds. \throws as Backups.
-  explicit BackupWriter(const std::string& folder, double interval = 0.5, int keep = 100);
+  explicit BackupWriter(const std::string& folder, LastBackup after = {}, double interval = 0.5, int keep = 100);
   ~BackupWriter(); ///< after writing what waits
   BackupWriter(const BackupWriter&) = delete;
   BackupWriter& operator=(const BackupWriter&) = delete;

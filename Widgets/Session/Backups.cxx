@@ -148,7 +148,7 @@ std::vector<Backup> NamedFor(const std::string& project)
     backups.insert(backups.end(), away.begin(), away.end());
   } catch (const Error&) { // no folder of the user
   }
-  std::stable_sort(backups.begin(), backups.end(), [](const Backup& a, const Backup& b) { return a.time > b.time; });
+  std::stable_sort(backups.begin(), backups.end(), [](const Backup& a, const Backup& b) { return a.number > b.number; });
   return backups;
 }
 
@@ -164,6 +164,7 @@ void Read(Backup& backup)
     ReadProject(backup.path, &stamp);
     backup.label = stamp.label;
     backup.inPlaceOf = stamp.inPlaceOf;
+    backup.lineage = stamp.lineage;
     backup.readable = stamp.number > 0; // a project without a stamp was not written here
   } catch (const Error&) {
     backup.readable = false;
@@ -196,7 +197,8 @@ std::string Time(std::int64_t time, const char* format)
 
 } // namespace
 
-Backups::Backups(const std::string& folder, int keep) : folder_(folder), keep_(std::max(keep, 1))
+Backups::Backups(const std::string& folder, LastBackup after, int keep)
+  : folder_(folder), after_(std::move(after)), keep_(std::max(keep, 1))
 {
   std::error_code error;
   fs::create_directories(folder, error);
@@ -221,7 +223,8 @@ bool Backups::Write(const Project& project, const std::string& label, bool inPla
     return false;
   const std::vector<Backup> earlier = Named(folder_);
   BackupStamp stamp;
-  stamp.number = earlier.empty() ? 1 : earlier.front().number + 1;
+  stamp.number = 1 + std::max(after_.number, earlier.empty() ? 0 : earlier.front().number);
+  stamp.lineage = after_.lineage;
   stamp.time = std::time(nullptr);
   stamp.label = label;
   const bool replaces = inPlaceOfLast && !lastPath_.empty();
@@ -259,6 +262,7 @@ bool Backups::Write(const Project& project, const std::string& label, bool inPla
     unsynced_.push_back(path);
   }
   lastStamp_ = stamp;
+  after_.number = stamp.number;
   last_ = project;
   lastPath_ = path;
   unsaved_.push_back(path);
@@ -297,15 +301,26 @@ std::vector<Backup> Backups::ListFor(const std::string& path)
   return Opened(NamedFor(path));
 }
 
-std::optional<Backup> Backups::NewestFor(const std::string& path, const timespec& saved)
+int Backups::LastNumberFor(const std::string& path)
 {
-  for (Backup& backup : NamedFor(path)) {
+  const std::vector<Backup> backups = NamedFor(path);
+  return backups.empty() ? 0 : backups.front().number;
+}
+
+std::optional<Backup> Backups::NewestFor(const std::string& path, const timespec& saved, const LastBackup& last)
+{
+  std::vector<Backup> backups = NamedFor(path);
+  const bool isNumbered = !last.lineage.empty();
+  if (!isNumbered)
+    std::stable_sort(backups.begin(), backups.end(), [](const Backup& a, const Backup& b) { return a.time > b.time; });
+  for (Backup& backup : backups) {
     struct stat file {};
-    if (backup.time < saved.tv_sec ||
-        (backup.time == saved.tv_sec && stat(backup.path.c_str(), &file) == 0 && IsBefore(file.st_mtim, saved)))
+    if (isNumbered ? backup.number <= last.number
+                   : backup.time < saved.tv_sec ||
+                         (backup.time == saved.tv_sec && stat(backup.path.c_str(), &file) == 0 && IsBefore(file.st_mtim, saved)))
       break;
     echorama::Read(backup);
-    if (backup.readable)
+    if (backup.readable && (!isNumbered || backup.lineage == last.lineage))
       return backup;
   }
   return std::nullopt;

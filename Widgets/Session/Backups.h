@@ -18,6 +18,7 @@ struct Backup {
   std::string label;     ///< the edit it was made after
   bool readable = true;  ///< false: damaged; it is kept, listed and not opened
   int inPlaceOf = 0;     ///< the number of an earlier one that goes: it is not listed, also when a kill has left it
+  std::string lineage;
 };
 
 /// A folder of numbered project files. Each is written under a temporary name and renamed: a kill at any moment leaves every
@@ -29,8 +30,9 @@ struct Backup {
 /// it ends; so whether a session is alive never depends on a process number that another process may have by now.
 class Backups {
 public:
-  /// Makes the folder, and removes what a killed process left half-written. \throws Error(FileSystem).
-  explicit Backups(const std::string& folder, int keep = 100);
+  /// Makes the folder, and removes what a killed process left half-written. Backups are of the lineage of \a after, and have
+  /// larger numbers. \throws Error(FileSystem).
+  explicit Backups(const std::string& folder, LastBackup after = {}, int keep = 100);
   ~Backups();
   Backups(const Backups&) = delete;
   Backups& operator=(const Backups&) = delete;
@@ -60,9 +62,12 @@ public:
   static std::string FolderFor(const std::string& path);
   /// All backups of a project, in either folder: the newest first.
   static std::vector<Backup> ListFor(const std::string& path);
-  /// The newest that can be read, when it was made after the project was last written, \a saved: its label is not told. Their
-  /// names tell seconds; within the same second the times of the files decide.
-  static std::optional<Backup> NewestFor(const std::string& path, const timespec& saved);
+  /// The largest number of a backup of a project, in either folder; 0: there is none.
+  static int LastNumberFor(const std::string& path);
+  /// The newest that can be read, when it was made after the project was last written: its label is not told. It is later when it
+  /// is of the lineage of \a last and has a larger number. For a project that does not know its last backup, the time \a saved of
+  /// its file decides: names of backups tell seconds; within the same second the times of the files count.
+  static std::optional<Backup> NewestFor(const std::string& path, const timespec& saved, const LastBackup& last);
   /// Sessions that ended without being saved: their folders, the newest first. Those that still run are not among them.
   static std::vector<std::string> Abandoned();
   /// Takes the backups of \a from over, as the next ones of \a to (a session that was saved for the first time, or recovered);
@@ -75,6 +80,7 @@ public:
 
 private:
   std::string folder_;
+  LastBackup after_;
   int keep_;
   int lock_ = -1;
   std::optional<Project> last_;

@@ -219,6 +219,8 @@ void CheckBackup(Json& root, const JsonPlace& file, BackupStamp& stamp)
   stamp.number = Count(place.Member(backup, "number"), place.In("number"));
   if (backup.contains("inPlaceOf"))
     stamp.inPlaceOf = Count(backup["inPlaceOf"], place.In("inPlaceOf"));
+  if (backup.contains("lineage"))
+    stamp.lineage = place.In("lineage").Text(backup["lineage"]);
   const Json& time = place.Member(backup, "time");
   if (!time.is_number_integer())
     place.In("time").Fail("a whole number is needed");
@@ -331,6 +333,11 @@ Project ReadProject(const std::string& path, BackupStamp* stamp)
     project.state.measurements = ToMeasurements(root["measurements"], file.In("measurements"));
   if (root.contains("comment"))
     project.comment = file.In("comment").Text(root["comment"]);
+  if (root.contains("lastBackup")) {
+    const JsonPlace place = file.In("lastBackup");
+    project.lastBackup = {place.In("lineage").Text(place.Member(root["lastBackup"], "lineage")),
+                          Count(place.Member(root["lastBackup"], "number"), place.In("number"))};
+  }
   if (stamp)
     *stamp = found;
   return project;
@@ -382,11 +389,15 @@ std::string TextOf(const Project& project, const std::string& path, const Backup
             {"comment", project.comment}};
   if (project.state.centre)
     root["centreOfRotation"] = JsonPlace::ListOf(*project.state.centre);
+  if (!stamp && !project.lastBackup.lineage.empty())
+    root["lastBackup"] = {{"lineage", project.lastBackup.lineage}, {"number", project.lastBackup.number}};
   try {
     if (stamp) {
       root["backup"] = {{"number", stamp->number}, {"time", stamp->time}, {"label", stamp->label}};
       if (stamp->inPlaceOf > 0)
         root["backup"]["inPlaceOf"] = stamp->inPlaceOf;
+      if (!stamp->lineage.empty())
+        root["backup"]["lineage"] = stamp->lineage;
       root["backup"]["checksum"] = TextChecksum(root.dump());
     }
     return root.dump(stamp ? -1 : 1) + '\n';

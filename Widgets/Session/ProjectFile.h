@@ -11,15 +11,23 @@ namespace echorama {
 /// The absolute path of a file, with symbolic links followed: two names of one file are one path. Empty stays empty.
 std::string ResolvedPath(const std::string& path);
 
+/// Which backup of a project was its last. A clock may be set back; numbers never are. They are compared within one lineage
+/// alone: what was made of one project file, until it is saved under another name.
+struct LastBackup {
+  std::string lineage; ///< empty: none is known
+  int number = 0;
+};
+
 /// What a project file holds.
 struct Project {
   SessionState state;                   ///< after reading: ids from 1, in order
   std::string truth;                    ///< pose file of the ground truth, absolute, or empty
   std::string comment;                  ///< for people: who, what
   std::map<std::string, Pose> truths{}; ///< of volumes, by name, that were set by hand: they count more than the file's
+  LastBackup lastBackup{};              ///< when the file was written
 };
 
-bool operator==(const Project&, const Project&); ///< exact: to the last bit
+bool operator==(const Project&, const Project&); ///< exact: to the last bit, of all but the last backup
 bool SameTruths(const std::map<std::string, Pose>& a, const std::map<std::string, Pose>& b);
 
 /// What a backup knows beside its project.
@@ -28,13 +36,14 @@ struct BackupStamp {
   std::int64_t time = 0; ///< of writing, seconds since 1970, UTC
   std::string label;     ///< the edit it was made after
   int inPlaceOf = 0;     ///< the number of an earlier one that goes, or 0
+  std::string lineage{};
 };
 
 /// A project on disk: {"schema": "echorama-project-1", "unit": "mm", "frame": "LPS", "volumes": [{"name", "file", "path",
 /// "geometry", "VolumeToWorld", "colour", "opacity", "visible", "group", "strokes": [{"mode", "radiusMm", "intensity", "opacity",
 /// "hardness", "insideValid", "pathMm": [[3], ...]}], "landmarks": [{"label", "position": [3]}], "madeOf", "TrueVolumeToWorld"}],
-/// "measurements": [{"number", "points": [[3], ...]}], "truth", "comment", "centreOfRotation"}. Documentation/session.md tells of
-/// each.
+/// "measurements": [{"number", "points": [[3], ...]}], "truth", "comment", "centreOfRotation", "lastBackup": {"lineage",
+/// "number"}}. Documentation/session.md tells of each.
 ///
 /// A project is a pose file too (ReadPoses reads it): the same fields with the same meaning, plus what a session knows. And a
 /// pose file ("echorama-poses-1") is a project whose volumes have default looks: all keys of a volume but "file" and

@@ -6,13 +6,26 @@
 #include "Core/Base/TextFile.h"
 #include "Widgets/Session/ProjectVolumes.h"
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
+#include <random>
 #include <sys/stat.h>
 #include <utility>
 
 namespace fs = std::filesystem;
 
 namespace echorama {
+namespace {
+
+std::string NewLineage()
+{
+  std::random_device draw;
+  char digits[20];
+  std::snprintf(digits, sizeof digits, "%08x%08x", draw(), draw());
+  return digits;
+}
+
+} // namespace
 
 std::size_t SessionStorage::FingerprintOf(const std::string& path)
 {
@@ -28,6 +41,7 @@ void SessionStorage::Opened(const std::string& path, const Project& project, std
   path_ = ResolvedPath(path);
   fingerprint_ = fingerprint;
   saved_ = project;
+  lineage_ = project.lastBackup.lineage;
   unworked_ = project.state;
   isUnfinished_ = false;
 }
@@ -40,6 +54,7 @@ void SessionStorage::Recovered(const std::string& path)
   path_.clear();
   fingerprint_ = 0;
   saved_ = {};
+  lineage_.clear();
   unworked_ = {};
   isUnfinished_ = false;
 }
@@ -72,14 +87,20 @@ std::string SessionStorage::Save(const std::string& given, Project project, bool
   if (path_ == path && there != 0 && there != std::exchange(fingerprint_, there))
     throw Error(Error::Kind::NotPossible, path + ": somebody else has changed it since it was opened or saved here; save again "
                                                  "to replace it, or save under another name");
+  if (writer_)
+    writer_->Wait(); // what was posted is earlier
+  const bool goesOn = path_ == path;
+  project.lastBackup = {goesOn && !lineage_.empty() ? lineage_ : NewLineage(),
+                        std::max(goesOn ? saved_.lastBackup.number : 0, Backups::LastNumberFor(path))};
   WriteProject(path, project);
   saved_ = project;
+  lineage_ = project.lastBackup.lineage;
   fingerprint_ = FingerprintOf(path);
   unworked_ = project.state;
   isForgotten_ = false;
   if (writer_)
     writer_->MarkSaved();
-  if (path_ == path)
+  if (goesOn)
     return {};
   // From now on backups lie beside the project. Those that were made before it was a project come along.
   const std::string before = writer_ && path_.empty() ? writer_->Folder() : std::string();
@@ -120,7 +141,11 @@ std::string SessionStorage::BackupFolder() const
 BackupWriter& SessionStorage::Writer()
 {
   if (!writer_) {
-    writer_ = std::make_unique<BackupWriter>(Backups::FolderFor(path_));
+    if (lineage_.empty())
+      lineage_ = NewLineage();
+    const int there = path_.empty() ? 0 : Backups::LastNumberFor(path_);
+    writer_ = std::make_unique<BackupWriter>(Backups::FolderFor(path_),
+                                             LastBackup{lineage_, std::max(saved_.lastBackup.number, there)});
     TakeOver(writer_->Folder());
   }
   return *writer_;
@@ -172,7 +197,7 @@ std::string SessionStorage::LaterBackup(const SessionState& state, const std::ve
   if (writer_)
     writer_->Wait();
   try {
-    if (const std::optional<Backup> newest = Backups::NewestFor(path_, saved.st_mtim)) {
+    if (const std::optional<Backup> newest = Backups::NewestFor(path_, saved.st_mtim, saved_.lastBackup)) {
       SessionState other = ReadProject(newest->path).state;
       for (SessionVolume& volume : other.volumes) {
         const std::string found = FindVolume(newest->path, volume.file, folders);

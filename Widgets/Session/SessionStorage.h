@@ -68,6 +68,7 @@ private:
   Project saved_;
   std::size_t fingerprint_ = 0;
   SessionState unworked_;
+  std::string lineage_;   ///< of the backups that are made here; empty: not known yet
   std::string recovered_; ///< the folder of the abandoned session that goes on here
   std::unique_ptr<BackupWriter> writer_;
   std::string trouble_; ///< why there is no writer, told once

@@ -194,7 +194,7 @@ TEST_F(BackupFolder, OldOnesAreThinnedOut)
   int number = 0;
   for (std::int64_t time = first; time < now; time += 600)
     PutOld(++number, time);
-  Backups backups(Path(), 20);
+  Backups backups(Path(), {}, 20);
   backups.Write(Step(1000), "new");
   const std::vector<Backup> list = backups.List();
   std::int64_t previous = std::numeric_limits<std::int64_t>::max();
@@ -291,7 +291,7 @@ TEST_F(BackupFolder, EditsAreWrittenBesideTheWork)
 
 TEST_F(BackupFolder, ADragIsOnTheDiskWithinASecondOfEachStep)
 {
-  BackupWriter writer(Path(), 0.2);
+  BackupWriter writer(Path(), {}, 0.2);
   writer.Post(Step(1), "drag", false);
   for (int step = 2; step <= 4; ++step)
     writer.Post(Step(step), "drag", false); // and then the mouse stands still
@@ -306,7 +306,7 @@ TEST_F(BackupFolder, ADragIsOnTheDiskWithinASecondOfEachStep)
 
 TEST_F(BackupFolder, ADiskThatHangsHoldsUpNeitherWorkNorBackups)
 {
-  BackupWriter writer(Path(), 0.02);
+  BackupWriter writer(Path(), {}, 0.02);
   const HangingDisk disk;
   writer.Post(Step(1), "one", true);
   const auto newest = [&] {
@@ -358,7 +358,7 @@ TEST_F(BackupFolder, AKillLeavesEveryBackupWhole)
   for (int round = 0; round < 12 || (made <= 50 && round < 60); ++round) { // more where the disk is slow
     const pid_t child = fork();
     if (child == 0) {
-      Backups backups(Path(), 30);
+      Backups backups(Path(), {}, 30);
       for (int step = 1;; ++step)
         if (backups.Write(Step(step), "step " + std::to_string(step), step % 3 == 0) && step % 2 == 0)
           backups.Sync();

@@ -107,6 +107,92 @@ TEST_F(SessionOnDisk, ALaterBackupIsOfOtherWork)
   EXPECT_EQ(storage.LaterBackup(Step(2).state, {}), "");
 }
 
+TEST_F(SessionOnDisk, WhatIsLaterDoesNotDependOnTheClock)
+{
+  const std::string path = Path("p.json"), other = Path("q.json");
+  const auto later = [this](const std::string& project, int open) { // for who opens it now; 0: nothing
+    SessionStorage storage;
+    storage.Opened(project, ReadProject(project), SessionStorage::FingerprintOf(project));
+    const std::string found = storage.LaterBackup(Step(open).state, {});
+    return found.empty() ? 0 : static_cast<int>(ReadProject(found).state.volumes[0].volumeToWorld.translation().x());
+  };
+  // The clock was a day ahead when that was written.
+  const auto putOff = [](const std::string& file) {
+    std::filesystem::last_write_time(file, std::filesystem::last_write_time(file) + std::chrono::hours(24));
+  };
+  const auto putOffBackups = [&] {
+    for (const Backup& backup : Backups::ListFor(path)) {
+      const std::string place = Path("p.backups/" + Backups::FileName(backup.number, backup.time + 86400));
+      std::filesystem::rename(backup.path, place);
+      putOff(place);
+    }
+  };
+  SessionStorage storage;
+  storage.BackUp(Step(1), "before the first save", true);
+  storage.Save(path, Step(2));
+  EXPECT_EQ(later(path, 2), 0);
+  putOff(path);
+  storage.BackUp(Step(3), "after the clock was set back", true);
+  EXPECT_EQ(later(path, 2), 3);
+  storage.BackUp(Step(4), "going on", true);
+  EXPECT_EQ(later(path, 2), 4);
+
+  putOffBackups();
+  storage.Save(path, Step(5));
+  EXPECT_EQ(later(path, 5), 0) << "that was earlier";
+  storage.BackUp(Step(6), "later", true);
+  EXPECT_EQ(later(path, 5), 6);
+  EXPECT_EQ(Labels(storage).front(), "later") << "the newest first";
+
+  // What waits for its turn is earlier than the file, too.
+  storage.Post(Step(7), "a drag", false);
+  storage.Save(path, Step(8));
+  EXPECT_EQ(later(path, 8), 0);
+
+  // Numbers go on where backups were removed, and when another session goes on.
+  std::filesystem::remove_all(Path("p.backups"));
+  SessionStorage next;
+  next.Opened(path, ReadProject(path), SessionStorage::FingerprintOf(path));
+  next.BackUp(Step(9), "of the next session", true);
+  putOff(path);
+  EXPECT_EQ(later(path, 8), 9);
+
+  // Numbers of another lineage tell nothing: a copy in the place of a project that has more backups.
+  SessionStorage copy;
+  copy.Save(other, Step(10));
+  for (int step = 11; step < 31; ++step)
+    copy.BackUp(Step(step), "of the other " + std::to_string(step), true);
+  EXPECT_EQ(later(other, 10), 30);
+  std::filesystem::copy_file(path, other, std::filesystem::copy_options::overwrite_existing);
+  EXPECT_EQ(later(other, 8), 0);
+  next.Save(other, Step(40)); // and another name is another lineage
+  EXPECT_EQ(later(other, 40), 0);
+  EXPECT_NE(ReadProject(other).lastBackup.lineage, ReadProject(path).lastBackup.lineage);
+  next.BackUp(Step(41), "later", true);
+  EXPECT_EQ(later(other, 40), 41);
+  EXPECT_EQ(later(path, 8), 9);
+}
+
+TEST_F(SessionOnDisk, TimesTellWhatIsLaterThanAFileThatKnowsNoBackup)
+{
+  const std::string path = Path("p.json");
+  WriteProject(path, Step(1)); // as a script does
+  const auto open = [&] {
+    SessionStorage storage;
+    storage.Opened(path, ReadProject(path), SessionStorage::FingerprintOf(path));
+    return storage.LaterBackup(Step(1).state, {});
+  };
+  SessionStorage storage;
+  storage.Opened(path, ReadProject(path), SessionStorage::FingerprintOf(path));
+  storage.BackUp(Step(2), "later", true);
+  EXPECT_NE(open(), "");
+  std::filesystem::last_write_time(path, std::filesystem::last_write_time(path) + std::chrono::hours(1));
+  EXPECT_EQ(open(), "");
+  storage.Save(path, Step(1));
+  EXPECT_NE(ReadProject(path).lastBackup.lineage, "");
+  EXPECT_EQ(ReadProject(path).lastBackup.number, 1);
+}
+
 TEST_F(SessionOnDisk, ABackupOfTheSecondInWhichTheProjectWasSavedIsLaterOnlyWhenItIs)
 {
   SessionStorage storage;
