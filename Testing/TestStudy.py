@@ -164,6 +164,15 @@ class Study(unittest.TestCase):
         before = (folder / "results.jsonl").read_bytes()
         self.assertEqual(len(study.run(folder, methods, PROGRAM, say=quiet)), 9)
         self.assertEqual((folder / "results.jsonl").read_bytes(), before)
+        # A run that was cut off in a line: that row is found again, and nothing else is.
+        lines = before.splitlines(keepends=True)
+        whole = b"".join(lines[:-2]) + lines[-1]
+        (folder / "results.jsonl").write_bytes(whole + lines[-2][:len(lines[-2]) // 2])
+        said.clear()
+        self.assertEqual(len(study.run(folder, methods, PROGRAM, say=said.append)), 9)
+        self.assertEqual(len(study.results_of(folder)), 9)
+        self.assertEqual(len([text for text in said if "left out" not in text]), 1, said)
+        self.assertTrue((folder / "results.jsonl").read_bytes().startswith(whole))
         with open(folder / "results.csv") as stream:
             table = list(csv.DictReader(stream))
         self.assertEqual([line["overlap"] for line in table], [str(line.get("overlap", "")) for line in rows])

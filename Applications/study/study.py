@@ -81,6 +81,15 @@ def results_of(folder):
     return list(rows.values())
 
 
+def add_result(folder, row):
+    """Adds a row. It begins a line of its own also where a run was cut off in one."""
+    with open(folder / "results.jsonl", "a+b") as stream:
+        stream.seek(max(stream.tell() - 1, 0))
+        if stream.read() not in (b"", b"\n"):
+            stream.write(b"\n")
+        stream.write(json.dumps(row).encode() + b"\n")
+
+
 def write_table(folder, rows):
     with open(pathlib.Path(folder) / "results.csv", "w", newline="") as stream:
         table = csv.DictWriter(stream, COLUMNS, extrasaction="ignore")
@@ -123,8 +132,7 @@ def run(folder, methods, program, again=False, limit=300.0, starts=None, say=pri
                 if np.isfinite(answer.predicted_mm):
                     row["predicted_mm"] = answer.predicted_mm
                 row.setdefault("reason", answer.reason)
-                with open(folder / "results.jsonl", "a") as stream:
-                    stream.write(json.dumps(row) + "\n")
+                add_result(folder, row)
                 error = f"{row['tre_mm']:.3f} mm, " if "tre_mm" in row else ""
                 say(f"{name} {start.name} {method}: {error}{row['seconds']:.1f} s {row['verdict']}"
                     + (f" ({row['error']})" if "error" in row else ""))
