@@ -61,6 +61,10 @@ void PlaceAxes(ImageHeader& header, int axes);
 /// \a file as named by the header at \a path: relative to its folder.
 std::string DetachedPath(const std::string& path, const std::string& file);
 
+/// The name of the file of voxels beside the header \a path: its own, with \a extension.
+/// \throws Error(InvalidParameter) when no reader of headers would find that name again.
+std::string DetachedName(const std::string& path, const std::string& extension);
+
 /// What readers of volumes say of a sequence.
 constexpr const char* NotAVolume = "it is a tracked sequence of frames, not a volume; vtkUltrasoundSequenceReader reads it";
 

@@ -219,6 +219,18 @@ std::string JoinedNumbers(const double* numbers, int count)
   return text;
 }
 
+std::string DetachedName(const std::string& path, const std::string& extension)
+{
+  const std::string name = fs::path(path).stem().string() + extension;
+  if (TrimBlanks(name) != name || name.compare(0, 4, "LIST") == 0 ||
+      std::any_of(name.begin(), name.end(), [](unsigned char c) { return c == '%' || c < 32; }))
+    throw Error(
+        Error::Kind::InvalidParameter,
+        path + ": its header cannot name the file of voxels beside it: a name with a line break or %, or that begins with a " +
+            "blank or LIST, is not found again; choose another name, or .mha or .nrrd");
+  return name;
+}
+
 std::string DetachedPath(const std::string& path, const std::string& file)
 {
   return (fs::path(path).parent_path() / file).string(); // an absolute name replaces the folder

@@ -186,7 +186,7 @@ SequenceRecorder::SequenceRecorder(const std::string& path, const SequenceConten
     const char letter = path.back(); // .mha, .mhd
     if (letter != 'd' && letter != 'D')
       p.Fail(Error::Kind::InvalidParameter, "a recording with images must end in .mhd; the pixels are written beside it");
-    p.pixelPath = DetachedPath(path, fs::path(path).stem().string() + ".raw");
+    p.pixelPath = DetachedPath(path, DetachedName(path, ".raw"));
     if (fs::path(p.pixelPath).filename().string().size() > 255)
       p.Fail(Error::Kind::InvalidParameter, "the name is too long");
   }

@@ -114,7 +114,7 @@ SequenceWriter::SequenceWriter(const std::string& path, const SequenceContent& c
 
   if (images) {
     if (detached) {
-      p.dataFile = fs::path(path).stem().string() + (!compress ? ".raw" : p.meta ? ".zraw" : ".raw.gz");
+      p.dataFile = DetachedName(path, !compress ? ".raw" : p.meta ? ".zraw" : ".raw.gz");
       p.pixelPath = files.Stage(DetachedPath(path, p.dataFile));
     } else
       p.pixelPath = p.scratch.Stage(path + ".pixels");
@@ -192,7 +192,9 @@ void SequenceWriter::Finish(const Progress& progress)
       progress.Part(0.2, 1.0)(done / all);
     }
     if (failed || done != all)
-      p.Fail(Error::Kind::FileSystem, "its pixels cannot be read back from the disk; what was there is left as it was");
+      p.Fail(Error::Kind::FileSystem, "its pixels cannot be read back from the disk (" +
+                                          (failed ? failed.message() : std::string("they end early")) +
+                                          "); what was there is left as it was");
   }
   p.header.close();
   p.CheckStreams();

@@ -76,7 +76,7 @@ VolumeWriter::VolumeWriter(const std::string& path, ImageHeader header, bool com
   p.bytes = header.ByteCount();
   std::string dataFile;
   if (extension == ".mhd" || extension == ".nhdr")
-    dataFile = fs::path(path).stem().string() + (!compress ? ".raw" : meta ? ".zraw" : ".raw.gz");
+    dataFile = DetachedName(path, !compress ? ".raw" : meta ? ".zraw" : ".raw.gz");
   const std::string text = nifti  ? NiftiHeaderText(path, header, p.roundingMm)
                            : meta ? MetaImageHeaderText(header, dataFile, p.compressedSizeAt)
                                   : NrrdHeaderText(header, dataFile);

@@ -64,7 +64,8 @@ public:
       else if (name == "AppendedData") {
         Appended(*element);
         break; // what follows is no XML
-      }
+      } else if (name == "/VTKFile")
+        break; // what follows is not of it
     }
     if (!image)
       lines_.Fail("it is not a VTK image file: it has no ImageData element");

@@ -55,6 +55,14 @@ class Names(Folder):
             self.assertIn("too long", done.stderr)
             self.assertEqual(snapshot(self.path), before)
 
+    def test_that_a_header_cannot_name(self):
+        before = snapshot(self.path)
+        for extension in (".mhd", ".nhdr"):
+            done = run("convert", self.good, self.path / f"two\nlines{extension}")
+            self.says_why(f"two lines{extension}", done)
+            self.assertIn("not found again", done.stderr)
+            self.assertEqual(snapshot(self.path), before)
+
 
 class Sizes(Folder):
     """Read with little memory and time: what a reader may take does not grow with a file that is not what it says."""
@@ -87,6 +95,30 @@ class Sizes(Folder):
     def test_empty_files(self):
         self.each(lambda path: path.write_bytes(b""))
 
+    def test_a_good_file_with_100_gb_behind_it(self):
+        for name, encode in (("appended", "SetDataModeToAppended"), ("inline", "SetDataModeToBinary"), ("text", "SetDataModeToAscii")):
+            path = self.path / f"{name}.vti"
+            made = subprocess.run([sys.executable, "-c", VTI, encode, path], capture_output=True, text=True, check=False)
+            self.assertEqual(made.returncode, 0, made.stderr)
+            self.assertEqual(self.tells(path).returncode, 0)
+            os.truncate(path, 100 << 30)  # a hole: it takes no room
+            done = self.tells(path)
+            with self.subTest(name=name):
+                self.assertIn(done.returncode, (0, 1), done.stderr)  # not ended for want of time
+                if done.returncode:
+                    self.says_why(path.name, done)
+
+
+VTI = """
+import sys
+from vtkmodules.vtkImagingCore import vtkRTAnalyticSource
+from vtkmodules.vtkIOXML import vtkXMLImageDataWriter
+source, writer = vtkRTAnalyticSource(), vtkXMLImageDataWriter()
+writer.SetInputConnection(source.GetOutputPort())
+getattr(writer, sys.argv[1])()
+writer.SetFileName(sys.argv[2])
+sys.exit(not writer.Write())
+"""
 
 
 COMMA = """

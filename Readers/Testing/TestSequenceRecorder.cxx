@@ -254,6 +254,7 @@ TEST_F(SequenceRecorderTest, Refused)
   content = Images(2, 2);
   content.fields = {{"two words", "x"}};
   refused("b.mhd", content, Error::Kind::BadInput, "cannot hold");
+  refused("two\nlines.mhd", Images(2, 2), Error::Kind::InvalidParameter, "not found again");
   Put("b.raw", "pixels");
   refused("b.mhd", Images(2, 2), Error::Kind::FileSystem, "it is there already");
   EXPECT_EQ(std::filesystem::file_size(Path("b.raw")), 6u);

@@ -175,6 +175,11 @@ TEST_F(SequenceWriterTest, WhatCannotBeWrittenLeavesWhatWasThere)
     EXPECT_EQ(std::filesystem::file_size(path), 6u);
   };
   SequenceFrame frame;
+  for (const char* name : {"two\nlines.mhd", "two\nlines.nhdr"}) {
+    ExpectRefused([&] { Write(Path(name), content, false, {frame}, {pixels}); }, Error::Kind::InvalidParameter, Path(name),
+                  "not found again");
+    EXPECT_EQ(FileCount(), 1);
+  }
   frame.time = INFINITY;
   refused(Error::Kind::BadInput, "time of frame 0", content, frame);
   frame = {};

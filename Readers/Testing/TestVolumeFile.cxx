@@ -343,6 +343,30 @@ TEST_F(VolumeFile, WhatCannotBeWritten)
   refused("a.nrrd", bad, Error::Kind::BadInput, "NDims");
 }
 
+TEST_F(VolumeFile, NamesThatAHeaderCannotName)
+{
+  const std::vector<unsigned char> voxels(60, 7);
+  const ImageHeader header = Oblique(VoxelType::UInt8);
+  for (const std::string name : {"two\nlines", "two\rlines", " blank", "half\tblank", "100%", "%d", "LIST", "LISTS"}) {
+    for (const std::string extension : {".mhd", ".nhdr"})
+      for (const bool compress : {false, true}) {
+        ExpectRefused([&] { Write(name + extension, header, voxels.data(), compress); }, Error::Kind::InvalidParameter,
+                      Path(name + extension), "not found again");
+        EXPECT_EQ(FileCount(), 0) << name;
+      }
+    for (const std::string extension : {".mha", ".nrrd"}) { // these hold their voxels
+      Write(name + extension, header, voxels.data());
+      EXPECT_TRUE(SameBits(Read<unsigned char>(name + extension), voxels)) << name << extension;
+      std::filesystem::remove(Path(name + extension));
+    }
+  }
+  for (const std::string name : {"in the middle", "at its end ", "a=b: c;#", "aLIST", "LOCAL", "\303\244"})
+    for (const std::string extension : {".mhd", ".nhdr"}) {
+      Write(name + extension, header, voxels.data(), false);
+      EXPECT_TRUE(SameBits(Read<unsigned char>(name + extension), voxels)) << name << extension;
+    }
+}
+
 TEST_F(VolumeFile, PiecesMakeTheSameFile)
 {
   ImageHeader header = Oblique(VoxelType::UInt16);

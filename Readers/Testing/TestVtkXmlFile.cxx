@@ -55,6 +55,7 @@ TEST_F(VtkXmlFile, GoodFilesPassAndMissingGeometryIsNoted)
   EXPECT_TRUE(CheckVtkXmlFile(File()).empty());
   EXPECT_EQ(CheckVtkXmlFile(File("Origin=\"0 0 0\" Spacing=\"1 1 1\" ")).size(), 2u);
   EXPECT_TRUE(CheckVtkXmlFile(File("binary", "ascii")).empty());
+  EXPECT_TRUE(CheckVtkXmlFile(File("</VTKFile>", "</VTKFile><DataArray/>")).empty()) << "what follows is not of it";
 }
 
 TEST_F(VtkXmlFile, ElementsThatVtkWouldNotSurviveAreRefused)
