@@ -6,10 +6,10 @@
 #include "Core/Base/TextFile.h"
 #include "Widgets/Session/ProjectVolumes.h"
 #include <algorithm>
-#include <cstdio>
+#include <chrono>
 #include <filesystem>
-#include <random>
 #include <sys/stat.h>
+#include <unistd.h>
 #include <utility>
 
 namespace fs = std::filesystem;
@@ -17,12 +17,10 @@ namespace fs = std::filesystem;
 namespace echorama {
 namespace {
 
+// A name that no other session gives: of this process at this nanosecond.
 std::string NewLineage()
 {
-  std::random_device draw;
-  char digits[20];
-  std::snprintf(digits, sizeof digits, "%08x%08x", draw(), draw());
-  return digits;
+  return std::to_string(getpid()) + "-" + std::to_string(std::chrono::system_clock::now().time_since_epoch().count());
 }
 
 } // namespace
