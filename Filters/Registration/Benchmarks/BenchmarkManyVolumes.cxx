@@ -5,13 +5,15 @@
 // `sweep`: everything but the pairs themselves, which a stand-in answers that knows the truth: what is made of the volumes, which
 // pairs overlap (peer: every volume against every other), the pose graph. `aligned`: with the pairs, with all the memory that
 // they like and with a fifth of it. `chain`: how errors add up over a hundred volumes, in a row without loops, in a ring, and in
-// two rows side by side.
+// two rows side by side. `neighbours`: what adds up there, the mean error of neighbours of a row along it and about the axis
+// across.
 //
-//   BenchmarkManyVolumes [sweep|aligned|chain]     default: all
+//   BenchmarkManyVolumes [sweep|aligned|chain|neighbours]     default: all
 #include "Core/Base/Random.h"
 #include "Core/Imaging/ValidPoints.h"
 #include "Filters/Phantoms/PhantomViews.h"
 #include "Filters/Registration/AlignVolumes.h"
+#include "Filters/Registration/LocalAlign.h"
 #include "Filters/Registration/OverlappingPairs.h"
 #include "Filters/Registration/PreparedVolume.h"
 #include "Testing/Benchmark.h"
@@ -299,6 +301,49 @@ void BenchmarkChain(const std::string& shape, const std::vector<Pose>& truth, st
   benchmark::Report("many_volumes", shape, "AlignVolumes", seconds, MeanErrorMm(views, result), "mm", numbers);
 }
 
+// From where they belong, at full resolution alone.
+void BenchmarkNeighbours(double stepMm)
+{
+  constexpr std::size_t Pairs = 48;
+  std::vector<Pose> poses;
+  for (std::size_t v = 0; v < 2 * Pairs; ++v) {
+    Random place(41, v / 2), tilt(43, v);
+    const Eigen::Vector3d first(place.Uniform(0.0, 150.0), place.Uniform(0.0, 150.0), place.Uniform(0.0, 150.0));
+    poses.push_back(MotionAbout(Views::Middle(), tilt.Direction() * tilt.Uniform(0.0, 0.15),
+                                first + Eigen::Vector3d(v % 2 == 0 ? 0.0 : stepMm, 0.0, 0.0)));
+  }
+  const Views views(poses);
+  const std::vector<PlacedVolume> placed = views.Placed();
+  LocalAlignParameters p;
+  p.points = 20000;
+  p.coarsestMm = SpacingMm;
+  for (const char* metric : {"local-ncc", "mind-ssc", "ncc"}) {
+    double overlap = 0.0, sum = 0.0, squares = 0.0, turn = 0.0, turnSquares = 0.0;
+    const double seconds = benchmark::Seconds([&] {
+      for (std::size_t pair = 0; pair < Pairs; ++pair) {
+        const Pose &fixed = poses[2 * pair], &moving = poses[2 * pair + 1];
+        const LocalAlignResult found = LocalAlign(*BuildMetricPyramid(placed[2 * pair], metric), fixed,
+                                                  *BuildMetricPyramid(placed[2 * pair + 1], metric), moving, p);
+        const Pose error = found.volumeToWorld * moving.inverse(Eigen::Isometry);
+        const double along = (error * found.centre - found.centre).x(),
+                     about = LogRotation(error.linear()).y() * 180.0 / EIGEN_PI;
+        overlap += found.overlap / Pairs;
+        sum += along / Pairs;
+        squares += along * along / Pairs;
+        turn += about / Pairs;
+        turnSquares += about * about / Pairs;
+      }
+    });
+    benchmark::Report("many_volumes", "neighbours, step " + std::to_string(static_cast<int>(stepMm)) + " mm", metric, seconds,
+                      std::sqrt(squares), "mm",
+                      {{"overlap", overlap},
+                       {"along_mm", sum},
+                       {"along_standard_error", std::sqrt((squares - sum * sum) / Pairs)},
+                       {"turn_degrees", turn},
+                       {"turn_standard_error", std::sqrt((turnSquares - turn * turn) / Pairs)}});
+  }
+}
+
 std::vector<Pose> Ring(int count, double stepMm)
 {
   std::vector<Pose> poses;
@@ -322,6 +367,9 @@ int main(int argc, char** argv)
       BenchmarkSweep(count);
   if (which.empty() || which == "aligned")
     BenchmarkAligned(25);
+  if (which.empty() || which == "neighbours")
+    for (const double stepMm : {15.0, 32.0, 44.0})
+      BenchmarkNeighbours(stepMm);
   if (which.empty() || which == "chain") {
     constexpr double ChainMm = 32.0; // neighbours overlap by a half, the next but one not at all
     BenchmarkChain("chain of 100", Sweep(100, 100, ChainMm, 0.0), 99);

@@ -9,21 +9,12 @@ import unittest
 
 import mpi_ranks
 from echorama import vtkUltrasoundAligner, vtkUltrasoundSceneSource
+from TestUltrasoundSceneSource import SCENE as ONE_RANK_SCENE
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
 
-SCENE = {
-    "schema": "echorama-scene-1",
-    "seed": 3,
-    "probe": {"preset": "mechanical-3d", "depthMinMm": 2, "depthMaxMm": 50, "elements": 16, "sweepSteps": 8, "samples": 80},
-    "background": "air",
-    "tissue": [{"name": "block", "box": {"centre": [0, 0, 35], "size": [80, 80, 62], "material": "muscle"}},
-               {"name": "ball", "sphere": {"centre": [0, 0, 28], "radius": 8, "material": "cyst"}}],
-    "views": {"poses": [{"face": [x, 0, 7], "target": [x / 3, 1, 50]} for x in (-6, 0, 6)]},
-    "press": {"spacingMm": 8},
-    "volume": {"spacingMm": 2, "knockMm": 8, "knockDegrees": 6},
-}
+SCENE = {**ONE_RANK_SCENE, "views": {"poses": [{"face": [x, 0, 7], "target": [x / 3, 1, 50]} for x in (-6, 0, 6)]}}
 
 
 @unittest.skipUnless(shutil.which("mpiexec"), "mpiexec is not installed")
