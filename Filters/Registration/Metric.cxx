@@ -167,7 +167,7 @@ std::shared_ptr<const MetricPyramid> BuildMetricPyramid(const PlacedVolume& volu
     level.geometry = in.geometry;
     level.voxelMm = std::cbrt(in.geometry.spacing.prod());
     level.octave = static_cast<int>(std::lround(std::log2(level.voxelMm)));
-    MetricSource source{in.intensity.View(), {}, RowSpans(in.intensity.View())};
+    MetricSource source{in.intensity.View(), {}, RowSpans(in.intensity.View()), result->levels.empty()};
     if (volume.reliability && l < volume.reliability->size())
       source.reliability = (*volume.reliability)[l].intensity.View();
     metric.see(source, level);

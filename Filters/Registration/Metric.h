@@ -87,6 +87,7 @@ struct MetricSource {
   VolumeView<const float> intensity;   ///< NaN where not real
   VolumeView<const float> reliability; ///< [0, 1]; empty: all 1
   RowSpans spans;                      ///< of the intensity
+  bool isFinest = true;                ///< of the pyramid's levels
   double Trust(std::ptrdiff_t i) const { return reliability.Empty() ? 1.0 : Clamped(reliability[i]); }
 
 private:

@@ -25,6 +25,7 @@ constexpr double SmoothVoxels = 0.6; // of what is compared
 // voxel (see Centre) not quite the same. Voxels count by how much of their window is real, from nothing to all between these two.
 constexpr float CutWindow = 0.6f, WholeWindow = 0.95f;
 constexpr float LeastCentred = 0.2f, AllButWhole = 0.999f; // windows that are worth it, and need it
+constexpr float FlatterBeside = 0.5f;                      // see Centre
 constexpr double FloorShare = 0.6;                         // of the level's own standard deviation: the floor under the local one
 constexpr float LeastTrust = 0.01f;
 
@@ -48,7 +49,8 @@ public:
     Gather(source, globalMean);
     for (Volume<float>& sums : sums_)
       GaussianSum(sums.View(), sigma);
-    Centre(sigmaVoxels);
+    if (source.isFinest)
+      Centre(sigmaVoxels);
   }
 
   /// Part of a row of voxels: the weight around each, the mean value times the weight and the mean square times the weight.
@@ -125,9 +127,10 @@ private:
   // A window that the border cuts has its middle beside its voxel, on the inner side. Its mean is that of there: a pattern that
   // moves with the volume, with which each of two volumes pulls the other onto itself. So the mean is followed back along its
   // slope. Where the middle is the weights tell: that of a Gaussian times w lies beside its own by its variance times the slope
-  // of log w, w being what the Gaussian leaves of the weights. The less is left, the flatter is that slope beside the tissue's:
-  // by 1 + b^2, b being how many standard deviations the middle lies beside (measured; a plane through what is left would ask for
-  // some 1 + 2 b, but tissue is no plane, and that pushes volumes apart).
+  // of log w, w being what the Gaussian leaves of the weights. The less is left, the flatter is the slope beside the tissue's:
+  // by 1 + b^2 / 2, b being how many standard deviations the middle lies beside (measured: with 1 + b^2 fine grain is pushed
+  // apart, with 1 smooth tissue pulled together). At the finest level only, where the answer is made: borders are wide at coarse
+  // ones, and what is guessed there costs starts that are far off.
   void Centre(const Eigen::Vector3d& sigmaVoxels)
   {
     const VolumeView<float> weight = sums_[0].View(), value = sums_[1].View(), square = sums_[2].View();
@@ -158,7 +161,7 @@ private:
             back += beside * (value[after] / weight[after] - value[before] / weight[before]);
             beside2 += beside * beside / variances[axis];
           }
-          back *= 1.0f + beside2;
+          back *= 1.0f + FlatterBeside * beside2;
           out[i] = w * (mean - back);
           square[i] += w * back * (back - 2.0f * mean); // so that the deviation stays
         }

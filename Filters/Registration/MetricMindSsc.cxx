@@ -21,7 +21,8 @@ namespace {
 void SeeMindSsc(const MetricSource& source, MetricLevel& level)
 {
   // What the border leaves of the window of a distance lies to one side, and so does what it tells: that pushes borders apart.
-  // Voxels count by how much is left of the most cut of their windows, from nothing to all between the last two.
+  // Voxels count by how much is left of the most cut of their windows, from nothing to all between the last two; at the finest
+  // level only, where the answer is made: coarse ones would be left without their wide borders.
   constexpr float LeastKnown = 0.02f, Cut = 0.6f, Whole = 0.95f;
   const auto& n = level.geometry.dimensions;
   const std::ptrdiff_t count = source.intensity.Size();
@@ -103,7 +104,8 @@ void SeeMindSsc(const MetricSource& source, MetricLevel& level)
         out[c] = static_cast<unsigned char>(std::lround(255.0f * similar));
       }
       const float texture = m[i] / (m[i] + 0.1f * typical + 1e-20f);
-      const float share = left.View()[i], whole = std::fmin(std::fmax((share - Cut) / (Whole - Cut), 0.0f), 1.0f);
+      const float share = left.View()[i];
+      const float whole = source.isFinest ? std::fmin(std::fmax((share - Cut) / (Whole - Cut), 0.0f), 1.0f) : 1.0f;
       const float weight = std::fmax(0.01f, texture) * whole * whole * static_cast<float>(source.Trust(i));
       const bool isSeen = real && share > LeastKnown && source.Trust(i) > 0.0;
       out[Channels] = static_cast<unsigned char>(isSeen ? std::lround(std::fmax(1.0f, 255.0f * weight)) : 0); // 0: not there
