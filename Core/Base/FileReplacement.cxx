@@ -45,16 +45,28 @@ std::string NameBeside(const fs::path& target, const char* purpose)
   return (target.parent_path() / (mark + name.substr(name.size() - std::min(name.size(), 255 - mark.size())))).string();
 }
 
-// Removes what processes of this machine that were killed left beside the target under such names.
+// Removes what processes of this machine that were killed left beside the target under such names. A file that was staged may have
+// been staged again by what wrote it, so its name may have several marks.
 void RemoveAbandoned(const fs::path& target, const std::string& purpose)
 {
-  const std::string rest = "@" + Machine() + "@" + target.filename().string();
+  const std::string machine = "@" + Machine() + "@", rest = target.filename().string();
+  const auto isOfTheDead = [&](const std::string& name, const std::string& kind) {
+    return name.rfind("." + kind, 0) == 0 && kill(std::atoi(name.c_str() + 1 + kind.size()), 0) != 0 && errno == ESRCH;
+  };
+  const auto withoutMark = [&](const std::string& name) {
+    const std::size_t at = std::min(name.find('@'), name.size());
+    return name.compare(at, machine.size(), machine) == 0 ? name.substr(at + machine.size()) : std::string();
+  };
   std::error_code error;
-  for (fs::directory_iterator entry(target.parent_path() / ".", error), end; !error && entry != end; entry.increment(error))
-    if (const std::string name = entry->path().filename().string();
-        name.rfind("." + purpose, 0) == 0 && name.substr(std::min(name.find('@'), name.size())) == rest &&
-        kill(std::atoi(name.c_str() + 1 + purpose.size()), 0) != 0 && errno == ESRCH)
+  for (fs::directory_iterator entry(target.parent_path() / ".", error), end; !error && entry != end; entry.increment(error)) {
+    std::string name = entry->path().filename().string();
+    if (!isOfTheDead(name, purpose))
+      continue;
+    for (name = withoutMark(name); name != rest && isOfTheDead(name, "part");)
+      name = withoutMark(name);
+    if (name == rest)
       fs::remove_all(entry->path(), error);
+  }
 }
 
 // An empty file beside the target that was not there before: whoever put a link in its place is not followed.

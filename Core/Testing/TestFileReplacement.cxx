@@ -158,6 +158,10 @@ TEST_F(FileReplacementTest, WhatKilledProcessesLeftIsRemoved)
                                name("part", dead, "-0" + here + "b@a.txt"),
                                name("old", dead, "-1" + here + "b-a.txt"),
                                name("old", alive, "-1" + here + "a.txt"),
+                               name("part", dead, "-5" + here + name("part", alive, "-4" + here + "a.txt")),
+                               name("part", dead, "-5" + here + name("part", dead, "-4" + elsewhere + "a.txt")),
+                               name("part", dead, "-5" + here + name("old", dead, "-4" + here + "a.txt")),
+                               name("part", dead, "-5" + here + name("part", dead, "-4" + here + "b.txt")),
                                name("part", dead, "-0" + elsewhere + "a.txt"),
                                name("old", dead, "-1" + elsewhere + "a.txt"),
                                name("part", dead, "-0@@a.txt"),
@@ -168,6 +172,7 @@ TEST_F(FileReplacementTest, WhatKilledProcessesLeftIsRemoved)
   for (const std::string& each : stays)
     Put(Path(each), "stays");
   Put(Path(name("part", dead, "-3" + here + "a.txt")), "half");
+  Put(Path(name("part", dead, "-5" + here + name("part", dead, "-4" + here + "a.txt"))), "half, of a file that was staged twice");
   Put(Path(name("old", dead, "-4" + here + "a.txt")), "aside");
   {
     FileReplacement replacement;
