@@ -242,34 +242,27 @@ void vtkUltrasoundSceneSource::MakeViews(vtkInformationVector* outputs, echorama
   }
   const int first = only > 0 ? only : 1;
   const std::size_t count = only > 0 ? 1 : static_cast<std::size_t>(views);
-  const auto forEachPort = [outputs](const auto& visit) {
-    unsigned int place = 0;
-    for (const int port : {Volumes, Beams, Truth}) {
-      visit(vtkMultiBlockDataSet::GetData(outputs, port), place++);
-    }
-  };
   const auto make = [&](std::size_t i, double begin, double end) {
     const auto at = [&](double part) { return 0.1 + 0.9 * (begin + (end - begin) * part); };
     const int number = first + static_cast<int>(i);
-    const auto block = static_cast<unsigned int>(i);
     echorama::SceneScan scan = run.Make(static_cast<std::size_t>(number) - 1, progress.Part(at(0.0), at(0.95)));
     SentView view{vtkSmartPointer<vtkMultiBlockDataSet>::New(), {}};
-    view.made = this->Put(scan, number, block, outputs, progress.Part(at(0.95), at(1.0)));
-    forEachPort([&](vtkMultiBlockDataSet* blocks, unsigned int place) {
-      PutBlock(view.blocks, place, blocks->GetBlock(block), blocks->GetMetaData(block)->Get(vtkCompositeDataSet::NAME()));
-    });
+    view.made = this->Put(scan, number, view.blocks, progress.Part(at(0.95), at(1.0)));
     scan.beams = {};
     scan.tissue = scan.gelSurface = {};
     view.made.Scan = std::move(scan);
     return view;
   };
   const auto hear = [&](std::size_t i, const SentView& view) {
-    forEachPort([&](vtkMultiBlockDataSet* blocks, unsigned int place) {
-      PutBlock(blocks, static_cast<unsigned int>(i), view.blocks->GetBlock(place),
+    unsigned int place = 0;
+    for (const int port : {Volumes, Beams, Truth}) {
+      PutBlock(vtkMultiBlockDataSet::GetData(outputs, port), static_cast<unsigned int>(i), view.blocks->GetBlock(place),
                view.blocks->GetMetaData(place)->Get(vtkCompositeDataSet::NAME()));
-    });
+      ++place;
+    }
   };
   const std::string about = std::to_string(count) + " views " + echorama::Checksum(this->RunOf.data(), this->RunOf.size());
+  shared.Exchange({}, about); // a scene that is not there, or is another one, is heard of before views are made
   for (SentView& view : echorama::ShareOut<SentView>(shared, count, count, about, make, hear)) {
     this->Made.push_back(std::move(view.made));
   }
@@ -289,9 +282,8 @@ void vtkUltrasoundSceneSource::MakeViews(vtkInformationVector* outputs, echorama
 }
 
 //----------------------------------------------------------------------------
-vtkUltrasoundSceneSource::MadeView vtkUltrasoundSceneSource::Put(echorama::SceneScan& scan, int number, unsigned int block,
-                                                                 vtkInformationVector* outputs,
-                                                                 const echorama::Progress& progress)
+vtkUltrasoundSceneSource::MadeView vtkUltrasoundSceneSource::Put(echorama::SceneScan& scan, int number,
+                                                                 vtkMultiBlockDataSet* blocks, const echorama::Progress& progress)
 {
   const echorama::SynthesisScene& scene = this->Run->Scene();
   const echorama::SynthesisParameters& p = scan.parameters;
@@ -303,8 +295,8 @@ vtkUltrasoundSceneSource::MadeView vtkUltrasoundSceneSource::Put(echorama::Scene
   made.Number = number;
   made.Knock = Knock(volume, static_cast<std::size_t>(number) - 1, scene.seed, scene.volume.knockMm, scene.volume.knockDegrees);
   vtkUltrasoundAcquisition::SetProbeToWorld(beams, made.Knock * p.probeToWorld); // as the volume says
-  PutBlock(vtkMultiBlockDataSet::GetData(outputs, Volumes), block, volume, "volume_" + suffix);
-  PutBlock(vtkMultiBlockDataSet::GetData(outputs, Beams), block, beams, "beams_" + suffix);
+  PutBlock(blocks, 0, volume, "volume_" + suffix);
+  PutBlock(blocks, 1, beams, "beams_" + suffix);
 
   vtkNew<vtkMultiBlockDataSet> truth;
   const auto put = [&truth](vtkDataObject* data, const char* name) { PutBlock(truth, truth->GetNumberOfBlocks(), data, name); };
@@ -332,7 +324,7 @@ vtkUltrasoundSceneSource::MadeView vtkUltrasoundSceneSource::Put(echorama::Scene
     FillLandmarks(landmarks, scan.landmarks, made.Knock);
     put(landmarks, "landmarks");
   }
-  PutBlock(vtkMultiBlockDataSet::GetData(outputs, Truth), block, truth, "view_" + suffix);
+  PutBlock(blocks, 2, truth, "view_" + suffix);
   return made;
 }
 

@@ -160,8 +160,7 @@ private:
   echorama::SynthesisScene Read() const;
   echorama::SceneRun& Prepare(const echorama::Progress& progress);
   void MakeViews(vtkInformationVector* outputs, echorama::SharedWork& shared, const echorama::Progress& progress);
-  MadeView Put(echorama::SceneScan& scan, int number, unsigned int block, vtkInformationVector* outputs,
-               const echorama::Progress& progress);
+  MadeView Put(echorama::SceneScan& scan, int number, vtkMultiBlockDataSet* blocks, const echorama::Progress& progress);
 
   Settings Values;
   vtkMultiProcessController* Controller = nullptr;

@@ -43,8 +43,10 @@ class Ranks(unittest.TestCase):
             self.assertEqual(told["bad file"]["views"], 0)
             self.assertEqual(len(told["bad file"]["errors"]), 1)
             self.assertRegex(told["bad file"]["errors"][0], r"rank 1: .*nowhere\.json")
+            self.assertLess(told["bad file"]["progress"], 0.2)  # heard of before any view was made
             self.assertEqual((told["stop"]["views"], told["stop"]["errors"]), (0, []))
             self.assertEqual(told["resting"]["views"], 3)
+            self.assertGreater(told["resting"]["progress"], 0.2)
 
 
 def digest_of(data, digest):
@@ -89,7 +91,8 @@ def make(case, rank):
     source.SetLandmarks(12)
     if case == "one view":
         source.SetView(2)
-    errors = mpi_ranks.errors_of(source)
+    errors, progress = mpi_ranks.errors_of(source), [0.0]  # VTK says 1 at the end, also of what has failed
+    source.AddObserver("ProgressEvent", lambda caller, event: progress.append(caller.GetProgress()))
     if case == "stop" and rank == 0:
         source.AddObserver("ProgressEvent", lambda caller, event: caller.SetAbortExecute(caller.GetProgress() > 0.3))
     if case == "aligned":
@@ -104,7 +107,7 @@ def make(case, rank):
     source.Update()
     report = json.loads(source.GetReport())
     told = {"errors": errors, "views": source.GetOutputDataObject(0).GetNumberOfBlocks(), "messages": report["messages"],
-            "ranks": report["ranks"], "notes": source.GetNotes()}
+            "progress": max(part for part in progress if part < 1), "ranks": report["ranks"], "notes": source.GetNotes()}
     if told["views"]:
         digest = hashlib.sha256()
         told["arrays"] = sum(digest_of(source.GetOutputDataObject(port), digest) for port in range(4))
