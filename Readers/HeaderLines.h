@@ -26,8 +26,10 @@ public:
 
   /// Error(BadFile): the file and the reason.
   [[noreturn]] void Fail(const std::string& reason) const;
-  /// The same, with the number of the line that was read last.
-  [[noreturn]] void FailHere(const std::string& reason) const;
+  /// The same, with the number of the line that was read last, or of a \a line that was read before.
+  [[noreturn]] void FailHere(const std::string& reason) const { FailAt(line_, reason); }
+  [[noreturn]] void FailAt(std::int64_t line, const std::string& reason) const;
+  std::int64_t Line() const { return line_; } ///< from 1
 
   /// \a text as \a count finite numbers that are separated by blanks.
   template <class T>

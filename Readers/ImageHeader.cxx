@@ -178,9 +178,9 @@ void HeaderLines::Fail(const std::string& reason) const
   FailFile(path_, reason);
 }
 
-void HeaderLines::FailHere(const std::string& reason) const
+void HeaderLines::FailAt(std::int64_t line, const std::string& reason) const
 {
-  throw Error(Error::Kind::BadFile, path_ + ", line " + std::to_string(line_) + ": " + reason);
+  throw Error(Error::Kind::BadFile, path_ + ", line " + std::to_string(line) + ": " + reason);
 }
 
 std::vector<int> HeaderLines::Sizes(const std::string& key, std::string_view text, std::size_t count) const

@@ -264,6 +264,18 @@ class BadInput(unittest.TestCase):
         write_poses(poses, ["good.mha"], [numpy.eye(4)])
         self.refuses("other.json", ["convert", poses, self.path / "other.json"], ["poses become .tfm"], status=2)
 
+    def test_transforms_of_other_programs(self):
+        other, bad = self.path / "other.mha", self.path / "bad.tfm"
+        write_mha(other, blobs(seed=2))
+        bad.write_text("#Insight Transform File V1.0\nTransform: AffineTransform_double_3_3\nParameters: 2 0 0 0 1 0 0 0 1 0 0 0\nFixedParameters: 0 0 0\n")
+        align = ["align", self.good, other, "-o", self.path / "poses.json"]
+        self.refuses("bad.tfm, line 4", [*align, "--transforms", "-", bad], ["not a rotation", "by 3"])
+        self.refuses("missing.tfm", [*align, "--transforms", "-", self.path / "missing.tfm"])
+        self.refuses("--transforms", [*align, "--transforms", bad], ["2 volumes", "there are 1"], status=2)
+        self.refuses("--transforms", [*align, "--transforms", "-", bad, "--poses", self.path / "start.json"], ["--poses"], status=2)
+        self.refuses("--transforms", [*align, "--transforms-only"], status=2)
+        self.refuses("bad.tfm", ["align", self.good, other, "-o", bad, "--transforms", "-", bad])
+
     # Volumes that are good files and bad input.
 
     def test_one_volume_where_two_are_needed(self):

@@ -8,6 +8,7 @@ matrix from voxels to mm (LPS). Grey values are compared bit by bit, points in m
 import argparse
 import collections
 import itertools
+import json
 import os
 import pathlib
 import re
@@ -21,13 +22,13 @@ import xml.etree.ElementTree as ElementTree
 
 import numpy
 
-from program_under_test import PLUS, SOURCE, read_mha, read_sequence, run, write_mha, write_poses, write_sequence
+from program_under_test import PLUS, SOURCE, blobs, read_mha, read_sequence, run, turned, write_mha, write_poses, write_sequence
 
 PAGE = SOURCE / "Documentation" / "data.md"
 BEGIN, END = "<!-- BEGIN interchange -->\n", "<!-- END interchange -->"
 Check = collections.namedtuple("Check", "peer files way compared bound function")  # bound: of the difference of points, mm
 CHECKS = []
-WRITES, READS = "we wrote, it read", "it wrote, we read"
+WRITES, READS, BOTH = "we wrote, it read", "it wrote, we read", "both read it"
 LPS = numpy.diag([-1.0, -1.0, 1.0, 1.0])  # from RAS, and back
 
 
@@ -307,6 +308,47 @@ def itk_applies_pose(folder):
     return assert_same(known, parsed_mha(folder / "itk.mha")[0], there, parsed_mha(folder / "itk.mha")[1])
 
 
+def we_pose(folder, transform):
+    """How `echorama align` moves known.mha by another program's transform, beside stays.mha."""
+    done = run("align", folder / "stays.mha", folder / "known.mha", "--transforms", "-", transform, "--transforms-only", "-o", folder / "poses.json", "--json")
+    assert done.returncode == 0, done.stderr
+    stays, pose = [numpy.array(one["VolumeToWorld"]) for one in json.loads(done.stdout)["volumes"]]
+    assert (stays == numpy.eye(4)).all(), stays
+    return pose
+
+
+def we_place(folder, transform):
+    """The matrix of known.mha, whose geometry is affine(), where it is then."""
+    write_mha(folder / "stays.mha", voxels("u1"))
+    return we_pose(folder, transform) @ affine()
+
+
+def itk_text(kind, parameters, fixed):
+    numbers = lambda values: " ".join(repr(float(value)) for value in values)
+    return f"#Transform 0\nTransform: {kind}_double_3_3\nParameters: {numbers(parameters)}\nFixedParameters: {numbers(fixed)}\n"
+
+
+CENTRE = (11.5, -70.25, 330.0)  # of rotation
+
+
+@check(ITK, ".tfm: VersorRigid3D, QuaternionRigid, Affine, Translation", BOTH,
+       "a volume that it resampled under its transform lies, voxel by voxel, where we put it")
+def itk_transforms(folder):
+    known, worst = voxels("u2"), 0.0
+    write_mha(folder / "known.mha", known, SPACING, ORIGIN, DIRECTION)
+    versor, shift = (0.3, -0.45, 0.6), (3.7, -21.3, 8.9)
+    scalar = (1 - numpy.dot(versor, versor))**0.5
+    for kind, parameters, fixed in (("VersorRigid3DTransform", (*versor, *shift), CENTRE), ("QuaternionRigidTransform", (*versor, scalar, *shift), CENTRE),
+                                    ("AffineTransform", (*DIRECTION.ravel(), *shift), CENTRE), ("TranslationTransform", shift, ())):
+        (folder / "theirs.tfm").write_text("#Insight Transform File V1.0\n" + itk_text(kind, parameters, fixed))
+        there = we_place(folder, folder / "theirs.tfm")
+        write_mha(folder / "grid.mha", numpy.zeros_like(known), SPACING, there[:3, 3], there[:3, :3] / SPACING)
+        plastimatch(folder / "known.mha", folder / "itk.mha", "--xf", folder / "theirs.tfm", "--fixed", folder / "grid.mha", "--interpolation", "nn",
+                    "--algorithm", "itk")
+        worst = max(worst, assert_same(known, parsed_mha(folder / "itk.mha")[0], there, parsed_mha(folder / "itk.mha")[1]))
+    return worst
+
+
 # ---- elastix -------------------------------------------------------------------------------------------------------------------
 
 def transformix(folder, source, transform, kind, extension, there, *more):
@@ -355,6 +397,19 @@ def elastix_writes(folder):
     return worst
 
 
+def points_of(folder):
+    """Points for transformix, in points.txt."""
+    points = numpy.random.default_rng(2).uniform(-100, 100, (20, 3))
+    (folder / "points.txt").write_text(f"point\n{len(points)}\n" + "".join(" ".join(map(repr, map(float, point))) + "\n" for point in points))
+    return points
+
+
+def points_off(folder, points, pose):
+    """By how much what transformix made of the points differs from the inverse of the pose: from the result to what is moved."""
+    found = [re.search(r"OutputPoint = \[ (.*?) \]", line)[1].split() for line in (folder / "outputpoints.txt").read_text().splitlines()]
+    return numpy.linalg.norm(numpy.array(found, float) - (points - pose[:3, 3]) @ pose[:3, :3], axis=1).max()
+
+
 @check(ELASTIX, ".mha, and the numbers of .tfm", WRITES, "our pose applied to our volume: the same voxels where the pose puts them; points in six decimals", 2e-6)
 def elastix_applies_pose(folder):
     known, there = voxels("u2"), moved() @ affine()
@@ -362,14 +417,73 @@ def elastix_applies_pose(folder):
     write_poses(folder / "poses.json", ["ours.mha"], [moved()])
     we_convert(folder / "poses.json", folder / "pose.tfm")
     parameters = re.search(r"^Parameters: (.*)$", (folder / "pose.tfm").read_text(), re.MULTILINE)[1].split()
-    points = numpy.random.default_rng(2).uniform(-100, 100, (20, 3))
-    (folder / "points.txt").write_text(f"point\n{len(points)}\n" + "".join(" ".join(map(repr, map(float, point))) + "\n" for point in points))
+    points = points_of(folder)
     made = transformix(folder, folder / "ours.mha", parameters, NAMES["u2"], "mha", there, "-def", folder / "points.txt")
     array, matrix = parsed_mha(made)
-    found = [re.search(r"OutputPoint = \[ (.*?) \]", line)[1].split() for line in (folder / "outputpoints.txt").read_text().splitlines()]
-    wanted = (points - moved()[:3, 3]) @ moved()[:3, :3]  # from the result to what is moved
-    off = numpy.linalg.norm(numpy.array(found, float) - wanted, axis=1).max()
+    off = points_off(folder, points, moved())
     return max(off, assert_same(known, array, there, matrix))
+
+
+@check(ELASTIX, "transform parameters: Euler in both orders, Affine, a chain", BOTH,
+       "points, in six decimals, and a volume that it resampled: where we put them", 2e-6)
+def elastix_transforms(folder):
+    known, worst, text = voxels("u2"), 0.0, lambda values: " ".join(repr(float(value)) for value in values)
+    write_mha(folder / "known.mha", known, SPACING, ORIGIN, DIRECTION)
+    points = points_of(folder)
+    angles, shift = (0.4, -0.7, 1.1), (3.7, -21.3, 8.9)
+    for name, kind, parameters, more in (("first", "EulerTransform", (*angles, *shift), ""),
+                                         ("turned", "EulerTransform", (*angles, *shift), '(ComputeZYX "true")'),
+                                         ("affine", "AffineTransform", (*DIRECTION.ravel(), *shift), ""),
+                                         ("chain", "EulerTransform", (0.1, 0.2, -0.3, 4, 5, 6), '(ComputeZYX "false")')):
+        before = folder / "first.txt" if name == "chain" else "NoInitialTransform"
+        (folder / f"{name}.txt").write_text(f"""(Transform "{kind}")
+(NumberOfParameters {len(parameters)})
+(TransformParameters {text(parameters)})
+(InitialTransformParametersFileName "{before}")
+(HowToCombineTransforms "Compose")
+(CenterOfRotationPoint {text(CENTRE)})
+{more}
+(FixedImageDimension 3)
+(MovingImageDimension 3)
+(FixedInternalImagePixelType "float")
+(MovingInternalImagePixelType "float")
+(UseDirectionCosines "true")
+(ResampleInterpolator "FinalBSplineInterpolator")
+(FinalBSplineInterpolationOrder 0)
+(Resampler "DefaultResampler")
+(DefaultPixelValue 0)
+(ResultImageFormat "mha")
+(ResultImagePixelType "unsigned short")
+(Size 7 6 5)
+(Index 0 0 0)
+(Spacing {text(SPACING)})
+""")
+        there = we_place(folder, folder / f"{name}.txt")
+        with open(folder / f"{name}.txt", "a") as more:
+            more.write(f"(Origin {text(there[:3, 3])})\n(Direction {text((there[:3, :3] / SPACING).T.ravel())})\n")
+        call("transformix", "-in", folder / "known.mha", "-tp", folder / f"{name}.txt", "-out", folder, "-def", folder / "points.txt")
+        off = points_off(folder, points, there @ numpy.linalg.inv(affine()))
+        array, matrix = parsed_mha(folder / "result.mha")
+        worst = max(worst, off, assert_same(known, array, there, matrix))
+    return worst
+
+
+@check(ELASTIX, "TransformParameters.0.txt of a registration", READS, "points, in six decimals; the moved volume comes back to where the fixed one is", 2e-6)
+def elastix_registers(folder):
+    pose = numpy.eye(4)
+    pose[:3, :3], pose[:3, 3] = turned(4, 1), (1.5, -1, 0.7)
+    write_mha(folder / "stays.mha", blobs())
+    write_mha(folder / "known.mha", blobs(), origin=pose[:3, 3], direction=pose[:3, :3])
+    (folder / "parameters.txt").write_text((SOURCE / "Testing" / "elastix-rigid.txt").read_text() +
+                                           '(Metric "AdvancedMeanSquares")\n(MaximumNumberOfIterations 200)\n')
+    call("elastix", "-f", folder / "stays.mha", "-m", folder / "known.mha", "-p", folder / "parameters.txt", "-out", folder)
+    points = points_of(folder)
+    call("transformix", "-tp", folder / "TransformParameters.0.txt", "-out", folder, "-def", folder / "points.txt")
+    found = we_pose(folder, folder / "TransformParameters.0.txt")
+    corners = numpy.array(list(itertools.product((0, blobs().shape[0] - 1), repeat=3)))
+    left = numpy.linalg.norm(corners @ (found @ pose)[:3, :3].T + (found @ pose)[:3, 3] - corners, axis=1).max()
+    assert left < 0.5, f"it lies {left:.2f} mm from where it was"
+    return points_off(folder, points, found)
 
 
 # ---- Teem ----------------------------------------------------------------------------------------------------------------------
@@ -610,7 +724,6 @@ def plus_writes(folder):
         counts[1] += 1
     for path in sorted(PLUS.glob("*.xml")):
         we_convert(path, folder / "set.json")
-        import json
         ours = {f"{one['from']}To{one['to']}": numpy.array(one["matrix"]) for one in json.loads((folder / "set.json").read_text())["transforms"]}
         for one in ElementTree.parse(path).iterfind(".//CoordinateDefinitions/Transform"):
             matrix = numpy.array(one.get("Matrix").split(), float).reshape(4, 4)

@@ -3,6 +3,7 @@
 #include "Commands.h"
 #include "Core/Base/Angles.h"
 #include "Displacements.h"
+#include "Filters/Calibration/ItkTransform.h"
 #include "Filters/Registration/AlignmentJson.h"
 #include "Landmarks.h"
 #include "ParameterOptions.h"
@@ -26,10 +27,10 @@ struct AlignOptions {
   std::string output, poses, apply;
   int fixed = 1;
   std::vector<int> held; // from 1
-  std::vector<std::string> landmarks;
+  std::vector<std::string> landmarks, transforms;
   TrackerOptions tracker;
   std::string calibration;
-  bool trackerOnly = false, deformable = false;
+  bool trackerOnly = false, transformsOnly = false, deformable = false;
 };
 
 // Puts each volume where the tracker says, as seen from the fixed one.
@@ -49,6 +50,20 @@ void PlaceVolumes(Session& session, AlignOptions& options, std::vector<LoadedVol
   session.result["tracker"] = {{"recording", options.tracker.log}, {"tool", tool.name}, {"calibration", options.calibration}};
   if (calibration.errorMm)
     session.Say("tracker: the calibration states an error of " + Fixed(*calibration.errorMm, 2) + " mm");
+}
+
+// What each transform says of its volume; "-" says nothing.
+std::vector<Pose> ReadTransformsOf(const AlignOptions& options)
+{
+  if (!options.transforms.empty() && options.transforms.size() != options.files.size())
+    throw Error(Error::Kind::InvalidParameter,
+                "--transforms: there are " + std::to_string(options.files.size()) +
+                    " volumes, so that as many transforms are needed, in their order (-: the volume stays); there are " +
+                    std::to_string(options.transforms.size()));
+  std::vector<Pose> poses;
+  for (const std::string& file : options.transforms)
+    poses.push_back(file == "-" ? Pose::Identity() : ReadItkTransform(file));
+  return poses;
 }
 
 // Each list goes where its volume is, which may have left the place that its file says.
@@ -100,7 +115,8 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
   for (const std::string& input : {options.tracker.log, options.calibration})
     if (!input.empty())
       inputs.push_back(input);
-  inputs.insert(inputs.end(), options.landmarks.begin(), options.landmarks.end());
+  for (const auto& files : {options.landmarks, options.transforms})
+    inputs.insert(inputs.end(), files.begin(), files.end());
   if (!options.poses.empty())
     inputs.push_back(options.poses);
   if (options.output.empty()) {
@@ -126,6 +142,7 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
     landmarks = ReadLandmarkLists(options.landmarks, options.files.size(), "there are ");
     MeasureLandmarkError(landmarks); // whether they can be compared at all
   }
+  const std::vector<Pose> transforms = ReadTransformsOf(options);
   // Places for the moved volumes are looked for first, so that nothing is refused after all the work.
   std::unique_ptr<OutputFolder> folder;
   std::vector<std::string> places;
@@ -141,7 +158,9 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
   ApplyPoses(session, volumes, options.poses);
   if (!options.tracker.log.empty())
     PlaceVolumes(session, options, volumes);
-  if (options.trackerOnly) {
+  for (std::size_t i = 0; i < transforms.size(); ++i)
+    MoveVolume(volumes[i], transforms[i]);
+  if (options.trackerOnly || options.transformsOnly) {
     std::vector<VolumePose> poses;
     session.result["output"] = options.output;
     session.result["fixed"] = options.fixed;
@@ -151,7 +170,7 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
       session.result["volumes"].push_back({{"file", volume.file}, {"VolumeToWorld", JsonOf(volume.volumeToWorld)}});
     }
     Write(session, options, volumes, places, poses, files, folder.get());
-    session.Say("wrote " + options.output + ", as the tracker says");
+    session.Say("wrote " + options.output + (options.trackerOnly ? ", as the tracker says" : ", as the transforms say"));
     return;
   }
   GiveLandmarks(landmarks, volumes, aligner);
@@ -233,6 +252,14 @@ void EchoramaCommand(CLI::App* options, Action& action)
       ->allow_extra_args(false) // volumes may follow
       ->check(CLI::Range(1, 1000000));
   options->add_option("--poses", values->poses, "Pose file to start from (default: where the volumes say)")->type_name("FILE");
+  options
+      ->add_option("--transforms", values->transforms,
+                   "Rigid transforms of ITK, 3D Slicer (.tfm) or elastix (TransformParameters.0.txt) to start from, one for each "
+                   "volume as the moving one, in their order (-: it stays)")
+      ->type_name("FILE")
+      ->excludes("--poses");
+  options->add_flag("--transforms-only", values->transformsOnly, "Leave the volumes where the transforms put them")
+      ->needs("--transforms");
   options->add_option("--fixed", values->fixed, "The volume (from 1) that stays where it is")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
@@ -245,15 +272,17 @@ void EchoramaCommand(CLI::App* options, Action& action)
                    "Calibration of the tracked probe, as echorama calibrate hand-eye writes it")
       ->type_name("FILE");
   options->add_flag("--tracker-only", values->trackerOnly, "Leave the volumes where the tracker says");
-  options->get_option("--tracker")->needs("--calibration")->excludes("--poses");
+  options->get_option("--tracker")->needs("--calibration")->excludes("--poses")->excludes("--transforms");
   options->get_option("--calibration")->needs("--tracker");
   options->get_option("--tracker-only")->needs("--tracker")->excludes(landmarks);
+  options->get_option("--transforms-only")->excludes(landmarks);
   options->add_option("--apply", values->apply, "Folder for the volumes with their new geometry")->type_name("FOLDER");
   CLI::Option* deformable =
       options
           ->add_flag("--deformable", values->deformable,
                      "Also find how tissue was deformed; the displacements are written beside the pose file, which names them")
-          ->excludes("--tracker-only");
+          ->excludes("--tracker-only")
+          ->excludes("--transforms-only");
   for (const char* name : {"ControlSpacingMm", "BendingWeight", "MinimumGain"})
     AddParameter(options, deformer, name)->needs(deformable);
   action = [values, aligner, deformer](Session& session) { Align(session, *values, aligner, deformer); };
