@@ -45,8 +45,8 @@ std::string NameBeside(const fs::path& target, const char* purpose)
   return (target.parent_path() / (mark + name.substr(name.size() - std::min(name.size(), 255 - mark.size())))).string();
 }
 
-// Removes what processes of this machine that were killed left beside the target under such names. A file that was staged may have
-// been staged again by what wrote it, so its name may have several marks.
+// Removes what processes of this machine that were killed left beside the target under such names. A file that was staged may
+// have been staged again by what wrote it, so its name may have several marks.
 void RemoveAbandoned(const fs::path& target, const std::string& purpose)
 {
   const std::string machine = "@" + Machine() + "@", rest = target.filename().string();
