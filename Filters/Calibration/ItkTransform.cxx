@@ -13,7 +13,6 @@ namespace echorama {
 namespace {
 
 constexpr const char* ItkMagic = "#Insight Transform File V1.0";
-constexpr double RotationTolerance = 1e-5; // what pose files allow, too
 constexpr double LargestMm = 1e7;
 constexpr int LongestChain = 32;
 
@@ -109,13 +108,14 @@ private:
   Pose PoseOf(const TransformType& type, const Numbers& parameters, const Numbers& fixed, std::int64_t line) const
   {
     const Eigen::Matrix3d matrix = type.matrix(parameters, fixed.size() > type.fixed && fixed.back() != 0.0);
-    const double off = (matrix.transpose() * matrix - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-    if (!(off <= RotationTolerance))
-      lines_.FailAt(line,
-                    "its matrix M is not a rotation, and only rigid transforms are poses: M^T M differs from the identity by " +
-                        NumberText(off) + "; " + NumberText(RotationTolerance) + " is allowed");
-    if (matrix.determinant() < 0.0)
-      lines_.FailAt(line, "its matrix is a mirror, not a rotation (determinant -1)");
+    if (!IsRotation(matrix)) {
+      const double off = (matrix.transpose() * matrix - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+      lines_.FailAt(line, IsRotation(-matrix)
+                              ? std::string("its matrix is a mirror, not a rotation (determinant -1)")
+                              : "its matrix M is not a rotation, and only rigid transforms are poses: M^T M differs "
+                                "from the identity by " +
+                                    NumberText(off));
+    }
     const Eigen::Vector3d centre = type.fixed == 3 ? Eigen::Vector3d(fixed.data()) : Eigen::Vector3d::Zero();
     Pose pose = Pose::Identity();
     pose.linear() = NearestRotation(matrix); // about the centre, which stays exact
