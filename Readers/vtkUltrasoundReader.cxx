@@ -47,10 +47,7 @@ const std::string FieldPrefix = "Echorama_"; // of our fields in a file's header
 // An array for the voxels of a file, which are read into its memory directly.
 vtkSmartPointer<vtkDataArray> NewArray(VoxelType type, std::size_t count, const char* name)
 {
-  auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(echorama::VtkTypeOf(type)));
-  array->SetName(name);
-  array->SetNumberOfTuples(static_cast<vtkIdType>(count));
-  return array;
+  return vtkUltrasoundVolume::NewArray(echorama::VtkTypeOf(type), static_cast<vtkIdType>(count), name);
 }
 
 // Throws Error(TooLarge) when so many slices of a volume (all, where it is negative) do not fit in the free memory.
@@ -449,14 +446,13 @@ void vtkUltrasoundReader::ReadSource(vtkImageData* output, const echorama::Progr
   vtkUltrasoundVolume::SetGeometry(output, content.geometry);
   CheckRoom(content);
   const auto intensity = NewArray(content.type, content.geometry.VoxelCount(), vtkUltrasoundVolume::IntensityName());
-  vtkSmartPointer<vtkUnsignedCharArray> valid;
+  unsigned char* valid = nullptr;
   if (content.holdsValidRegion) {
-    valid = vtkSmartPointer<vtkUnsignedCharArray>::New();
-    valid->SetName(vtkUltrasoundVolume::ValidRegionName());
-    valid->SetNumberOfTuples(intensity->GetNumberOfTuples());
-    output->GetPointData()->AddArray(valid);
+    const auto region = NewArray(VoxelType::UInt8, intensity->GetNumberOfTuples(), vtkUltrasoundVolume::ValidRegionName());
+    output->GetPointData()->AddArray(region); // which holds it
+    valid = static_cast<unsigned char*>(region->GetVoidPointer(0));
   }
-  source->Read(index, intensity->GetVoidPointer(0), valid ? valid->GetPointer(0) : nullptr, progress);
+  source->Read(index, intensity->GetVoidPointer(0), valid, progress);
   output->GetPointData()->SetScalars(intensity);
   this->SetFields(content, output);
 }
@@ -579,9 +575,7 @@ void vtkUltrasoundReader::FindValidRegion(vtkImageData* output, const echorama::
     return;
   }
 
-  const vtkNew<vtkUnsignedCharArray> valid;
-  valid->SetName(vtkUltrasoundVolume::ValidRegionName());
-  valid->SetNumberOfTuples(output->GetNumberOfPoints());
+  const auto valid = NewArray(VoxelType::UInt8, output->GetNumberOfPoints(), vtkUltrasoundVolume::ValidRegionName());
   const auto target = vtkUltrasoundVolume::ViewOf<unsigned char>(valid, output);
   vtkDataArray* intensity = vtkUltrasoundVolume::GetIntensity(output);
   std::int64_t missing = 0;

@@ -227,9 +227,8 @@ private:
       const auto voxels = vtkUltrasoundVolume::ViewOf<T>(this->Intensity, this->Base);
       if (!this->Valid) // every voxel that is a number is real
       {
-        this->Valid = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(VTK_UNSIGNED_CHAR));
-        this->Valid->SetName(vtkUltrasoundVolume::ValidRegionName());
-        this->Valid->SetNumberOfTuples(this->Base->GetNumberOfPoints());
+        this->Valid = vtkUltrasoundVolume::NewArray(VTK_UNSIGNED_CHAR, this->Base->GetNumberOfPoints(),
+                                                    vtkUltrasoundVolume::ValidRegionName());
         std::transform(voxels.begin(), voxels.end(), static_cast<unsigned char*>(this->Valid->GetVoidPointer(0)),
                        [](T value) -> unsigned char { return std::isfinite(static_cast<double>(value)) ? 1 : 0; });
       }

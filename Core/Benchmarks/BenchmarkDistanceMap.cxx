@@ -51,7 +51,7 @@ Volume<unsigned char> Fan(int size)
 // Balls of all sizes, as lesions or vessels in a segmentation.
 Volume<unsigned char> Balls(int size)
 {
-  Volume<unsigned char> mask({size, size, size}, 0);
+  Volume<unsigned char> mask({size, size, size});
   Random random(3);
   for (int ball = 0; ball < 200; ++ball) {
     const double scale = static_cast<double>(size) / Small;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/ZeroedMemory.h"
 #include "Core/Geometry/ImageGeometry.h"
 #include <array>
 #include <cstddef>
 #include <type_traits>
-#include <vector>
 
 namespace echorama {
 
@@ -38,24 +38,25 @@ private:
   std::array<int, 3> dimensions_{0, 0, 0};
 };
 
-/// Voxels of its own.
+/// Voxels of its own, zeros where no other value is given.
 template <class T>
 class Volume {
 public:
   Volume() = default;
-  explicit Volume(const std::array<int, 3>& dimensions, T value = T())
-    : data_(static_cast<std::size_t>(dimensions[0]) * static_cast<std::size_t>(dimensions[1]) *
-                static_cast<std::size_t>(dimensions[2]),
-            value),
-      dimensions_(dimensions)
-  {
-  }
+  explicit Volume(const std::array<int, 3>& dimensions) : data_(SizeOf(dimensions)), dimensions_(dimensions) {}
+  Volume(const std::array<int, 3>& dimensions, T value) : data_(SizeOf(dimensions), value), dimensions_(dimensions) {}
   VolumeView<T> View() { return {data_.data(), dimensions_}; }
   VolumeView<const T> View() const { return {data_.data(), dimensions_}; }
   const std::array<int, 3>& Dimensions() const { return dimensions_; }
 
 private:
-  std::vector<T> data_;
+  static std::size_t SizeOf(const std::array<int, 3>& dimensions)
+  {
+    return static_cast<std::size_t>(dimensions[0]) * static_cast<std::size_t>(dimensions[1]) *
+           static_cast<std::size_t>(dimensions[2]);
+  }
+
+  Zeroed<T> data_;
   std::array<int, 3> dimensions_{0, 0, 0};
 };
 

@@ -60,9 +60,7 @@ vtkDataArray* vtkUltrasoundImageAlgorithm::CopyWithNewIntensity(vtkImageData* in
 //----------------------------------------------------------------------------
 vtkDataArray* vtkUltrasoundImageAlgorithm::AddArray(vtkImageData* output, const char* name, int vtkType)
 {
-  auto fresh = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(vtkType));
-  fresh->SetName(name);
-  fresh->SetNumberOfTuples(output->GetNumberOfPoints());
+  const auto fresh = vtkUltrasoundVolume::NewArray(vtkType, output->GetNumberOfPoints(), name);
   output->GetPointData()->AddArray(fresh); // replaces one of the same name
   return fresh;                            // the output holds it
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundVolume.h"
 
+#include "Core/Base/HugePages.h"
 #include "Core/Geometry/MatrixRows.h"
 #include "vtkAlgorithm.h"
 #include "vtkCompositeDataSet.h"
@@ -35,6 +36,17 @@ vtkDataArray* vtkUltrasoundVolume::GetIntensity(vtkImageData* volume)
   vtkPointData* arrays = volume ? volume->GetPointData() : nullptr;
   vtkDataArray* named = arrays ? arrays->GetArray(IntensityName()) : nullptr;
   return named || !arrays ? named : arrays->GetScalars();
+}
+
+//----------------------------------------------------------------------------
+vtkSmartPointer<vtkDataArray> vtkUltrasoundVolume::NewArray(int vtkType, vtkIdType tuples, const char* name)
+{
+  auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(vtkType));
+  array->SetName(name);
+  array->SetNumberOfTuples(tuples);
+  const auto bytes = static_cast<std::size_t>(tuples) * static_cast<std::size_t>(array->GetDataTypeSize());
+  echorama::PreferHugePages(array->GetVoidPointer(0), bytes);
+  return array;
 }
 
 //----------------------------------------------------------------------------

@@ -18,6 +18,7 @@
 #include "Core/Imaging/VolumeView.h"
 #include "Core/Imaging/VoxelTypes.h"
 #include "vtkDataArray.h"
+#include "vtkSmartPointer.h"
 #include "vtkTypeTraits.h"
 #include <functional>
 #include <optional>
@@ -68,6 +69,9 @@ public:
   static bool Move(vtkImageData* volume, vtkMatrix4x4* pose);
 
 #ifndef __VTK_WRAP__
+  /** An array for the voxels of a large volume, not filled: on huge pages where the system has them. */
+  static vtkSmartPointer<vtkDataArray> NewArray(int vtkType, vtkIdType tuples, const char* name);
+
   /** The geometry of the voxels; a first extent that is not zero is folded into the origin. */
   static echorama::ImageGeometry GeometryOf(vtkImageData* volume);
 

@@ -16,8 +16,8 @@
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
+#include "Core/Base/ZeroedMemory.h"
 #include "Core/Imaging/ScanConversion.h"
-#include "Filters/Stitching/ZeroedMemory.h"
 #include <algorithm>
 #include <cmath>
 #include <cstring>

@@ -11,8 +11,8 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
+#include "Core/Base/ZeroedMemory.h"
 #include "Core/Imaging/VoxelTypes.h"
-#include "Filters/Stitching/ZeroedMemory.h"
 #include <cmath>
 #include <cstdint>
 #include <numeric>

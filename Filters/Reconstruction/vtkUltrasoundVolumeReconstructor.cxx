@@ -44,9 +44,7 @@ echorama::VolumeView<const unsigned char> MaskOf(const vtkUltrasoundVolume::Inpu
 
 vtkDataArray* MakeArray(vtkImageData* image, const char* name, int type)
 {
-  auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(type));
-  array->SetName(name);
-  array->SetNumberOfTuples(image->GetNumberOfPoints());
+  const auto array = vtkUltrasoundVolume::NewArray(type, image->GetNumberOfPoints(), name);
   image->GetPointData()->AddArray(array);
   return array;
 }

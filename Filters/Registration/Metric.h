@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/ZeroedMemory.h"
 #include "LocalAlign.h"
 #include <array>
 #include <cstdint>
@@ -34,12 +35,12 @@ private:
 /// the descriptor and one of the weight, which is 0 where a voxel is not real.
 struct MetricLevel {
   ImageGeometry geometry;
-  double voxelMm = 0.0;                   ///< geometric mean of the spacing
-  int octave = 0;                         ///< log2(voxelMm), rounded: windows follow it, so that two volumes are seen alike
-  std::vector<SeenVoxel> seen;            ///< of a metric that compares values
-  std::vector<SeenVoxel> edges;           ///< the gradient's magnitude and the weight (lc2), else empty
-  std::vector<unsigned char> descriptors; ///< 16 bytes per voxel (mind-ssc), else empty
-  std::vector<std::int32_t> realBefore;   ///< how many real voxels lie before each run of RunLength; the last: how many there are
+  double voxelMm = 0.0;                 ///< geometric mean of the spacing
+  int octave = 0;                       ///< log2(voxelMm), rounded: windows follow it, so that two volumes are seen alike
+  Zeroed<SeenVoxel> seen;               ///< of a metric that compares values
+  Zeroed<SeenVoxel> edges;              ///< the gradient's magnitude and the weight (lc2), else empty
+  Zeroed<unsigned char> descriptors;    ///< 16 bytes per voxel (mind-ssc), else empty
+  std::vector<std::int32_t> realBefore; ///< how many real voxels lie before each run of RunLength; the last: how many there are
 
   static constexpr std::ptrdiff_t RunLength = 64;
   std::ptrdiff_t RealVoxels() const { return realBefore.back(); }

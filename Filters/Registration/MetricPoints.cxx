@@ -304,6 +304,9 @@ private:
 
     // Where, in index coordinates, and which block.
     std::vector<float> x, y, z;
+    points.drawn.reserve(drawn.size());
+    for (std::vector<float>* axis : {&x, &y, &z})
+      axis->reserve(drawn.size() * each);
     for (const Eigen::Vector3f& at : drawn) {
       if (setup_.part != 0 && ((BlockAt(at, side).sum() % 2 + 2) % 2) + 1 != setup_.part)
         continue;

@@ -21,8 +21,8 @@ double BytesOf(const std::vector<PyramidLevel>& levels)
   return bytes;
 }
 
-template <class T>
-double BytesOf(const std::vector<T>& values)
+template <class T, class Memory>
+double BytesOf(const std::vector<T, Memory>& values)
 {
   return static_cast<double>(values.capacity()) * sizeof(T);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "Core/Base/ZeroedMemory.h"
 #include "GridBox.h"
-#include "ZeroedMemory.h"
 #include <vector>
 
 namespace echorama {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Base/Parallel.h"
-#include "Filters/Stitching/ZeroedMemory.h"
+#include "Core/Base/ZeroedMemory.h"
 #include <algorithm>
 #include <array>
 #include <cstdint>

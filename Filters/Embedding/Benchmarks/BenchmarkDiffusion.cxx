@@ -154,7 +154,7 @@ void Compare(int n)
   Volume<unsigned char> some;
   double share = 1.0;
   if (n > 128) {
-    some = Volume<unsigned char>({n, n, n}, 0);
+    some = Volume<unsigned char>({n, n, n});
     const int tiles = n / 8;
     for (int k = 0; k < n; ++k)
       for (int j = 0; j < n; ++j)

@@ -11,8 +11,21 @@
 
 namespace echorama {
 
-/// Memory of arrays that begin with zeros and are swept again and again: large ones lie on huge pages where the system has them,
-/// and nobody writes the zeros, so that each thread brings in the pages that it is the first to write to.
+// An address sanitizer sees past the end of what malloc gave, not of what mmap did.
+#if defined(__SANITIZE_ADDRESS__)
+#define ECHORAMA_HUGE_PAGES 0
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define ECHORAMA_HUGE_PAGES 0
+#endif
+#endif
+#if !defined(ECHORAMA_HUGE_PAGES) && defined(__linux__)
+#define ECHORAMA_HUGE_PAGES 1
+#endif
+
+/// Memory of arrays of numbers that begin with zeros: large ones lie on huge pages where the system has them (a fault of a page
+/// costs as much as a pass over it, and a huge page is 512 of them), and nobody writes the zeros, so that each thread brings in
+/// the pages that it is the first to write to.
 template <class T>
 class ZeroedMemory {
 public:
@@ -25,7 +38,7 @@ public:
   T* allocate(std::size_t count)
   {
     void* memory = nullptr;
-#ifdef __linux__
+#if ECHORAMA_HUGE_PAGES
     if (const std::size_t bytes = Bytes(count); bytes >= Large) {
       // As much as is needed, from the beginning of a huge page on.
       void* all = mmap(nullptr, bytes + HugePage, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -47,7 +60,7 @@ public:
   }
   void deallocate(T* memory, std::size_t count)
   {
-#ifdef __linux__
+#if ECHORAMA_HUGE_PAGES
     if (const std::size_t bytes = Bytes(count); bytes >= Large) {
       munmap(memory, bytes);
       return;
@@ -83,7 +96,8 @@ private:
   }
 };
 
-/// An array of numbers, made with so many zeros: Zeroed<float> array(count).
+/// An array of numbers, made with so many zeros: Zeroed<float> array(count). It is made at its size: what one that shrank grows
+/// by again is not zero.
 template <class T>
 using Zeroed = std::vector<T, ZeroedMemory<T>>;
 
