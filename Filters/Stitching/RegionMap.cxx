@@ -11,6 +11,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Imaging/DistanceMap.h"
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -260,6 +261,41 @@ Boxed<float> RegionMap::SquaredDepth(int volume, const Progress& progress) const
   depth.values = Volume<float>(depth.box.size);
   SquaredDistanceMap(outside.View(), spacing_, depth.values.View(), progress.Part(0.1, 1.0));
   return depth;
+}
+
+double RegionMap::OverlapThickness(int volume) const
+{
+  if (OverlapCount(volume) == 0)
+    return 0.0;
+  // What voxels of a row are, from one before the box to one behind it: 0 nothing, 1 someone alone or others, 2 the overlap.
+  const GridBox& own = Box(volume);
+  const auto& n = coverage_.Dimensions();
+  const int before = own.first[0] > 0 ? 1 : 0, behind = own.first[0] + own.size[0] < n[0] ? 1 : 0;
+  const std::size_t width = static_cast<std::size_t>(own.size[0] + 2);
+  const auto read = [&](int j, int k, unsigned char* row) {
+    std::fill_n(row, width, static_cast<unsigned char>(0));
+    if (j < 0 || k < 0 || j >= n[1] || k >= n[2])
+      return;
+    coverage_.Copy(own.first[0] - before, j, k, before + own.size[0] + behind, row + 1 - before);
+    const unsigned char* const mask = own.HasRow(j, k) ? MaskRow(volume, j, k) - 1 : nullptr;
+    for (std::size_t i = 0; i < width; ++i) {
+      const bool isOwn = mask && i > 0 && i + 1 < width && (mask[i] & 1) != 0;
+      row[i] = static_cast<unsigned char>(isOwn && row[i] > 1 ? 2 : row[i] > 0 ? 1 : 0);
+    }
+  };
+  const GridBox rows{{0, own.first[1] - 1, own.first[2] - 1}, {1, own.size[1] + 1, own.size[2] + 1}};
+  std::atomic<std::ptrdiff_t> faces = 0;
+  ForRows(rows, Progress(), [&](int j, int k) {
+    std::vector<unsigned char> here(width), above(width), next(width);
+    read(j, k, here.data());
+    read(j + 1, k, above.data());
+    read(j, k + 1, next.data());
+    std::ptrdiff_t found = 0;
+    for (std::size_t i = 0; i < width; ++i)
+      found += ((here[i] * above[i]) == 2) + ((here[i] * next[i]) == 2) + (i + 1 < width && here[i] * here[i + 1] == 2);
+    faces += found;
+  });
+  return 2.0 * static_cast<double>(OverlapCount(volume)) / static_cast<double>(faces.load());
 }
 
 void RegionMap::GiveCores(const Progress& progress)

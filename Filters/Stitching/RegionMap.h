@@ -40,6 +40,10 @@ public:
   /// How many of these lie before (i, j, k): a dense numbering of the overlap.
   std::ptrdiff_t OverlapBefore(int i, int j, int k) const;
 
+  /// How thick the overlap of a volume is on the average, in voxels: twice its voxels over the faces at which it meets where this
+  /// volume or others are alone. Infinite where it meets no such place; 0: there is no overlap.
+  double OverlapThickness(int volume) const;
+
   /// Whether a volume covers each voxel of its row (bit 0 of the bytes), from Box(volume).first[0] on.
   const unsigned char* MaskRow(int volume, int j, int k) const { return masks_[volume].Row(j, k); }
   const Boxed<unsigned char>& Mask(int volume) const { return masks_[volume]; }

@@ -40,15 +40,31 @@ constexpr float noValue = std::numeric_limits<float>::quiet_NaN();
 template <class T>
 using Accumulator = std::conditional_t<std::is_same_v<T, double>, double, float>;
 
-void CheckRegions(const StitchParameters& parameters, const std::vector<StitchInput>& inputs, const RegionMap& regions)
+// Overlaps of so many voxels are thick: membranes in them are told by every other voxel.
+constexpr double thickOverlap = 12.0;
+
+// The regions may be those of a coarser grid, which can miss what is thin.
+void CheckRegions(const StitchParameters& parameters, const std::vector<StitchInput>& inputs, const RegionMap& regions,
+                  const std::vector<StitchSampler>& samplers)
 {
-  for (int v = 0; v < regions.Count(); ++v)
-    if (regions.InsideCount(v) == 0)
+  for (int v = 0; v < regions.Count(); ++v) {
+    if (regions.OverlapCount(v) > 0 || (parameters.allowDisjoint && regions.InsideCount(v) > 0))
+      continue;
+    const Presence presence = PresenceOf(samplers, static_cast<std::size_t>(v));
+    if (!presence.isInside)
       throw Error(Error::Kind::BadInput, inputs[v].name + ": no voxel is valid and finite at a voxel of the output grid");
-  for (int v = 0; v < regions.Count() && !parameters.allowDisjoint; ++v)
-    if (regions.OverlapCount(v) == 0)
+    if (!presence.isShared && !parameters.allowDisjoint)
       throw Error(Error::Kind::NotPossible,
                   inputs[v].name + " overlaps no other volume; check its pose, or set AllowDisjoint to put it where it is");
+  }
+}
+
+bool AreOverlapsThick(const RegionMap& regions, double voxels)
+{
+  for (int v = 0; v < regions.Count(); ++v)
+    if (!(regions.OverlapThickness(v) >= voxels))
+      return false;
+  return true;
 }
 
 bool IsTextured(const StitchParameters& parameters)
@@ -98,6 +114,11 @@ ParameterList Describe(StitchParameters& p)
           .Advanced(),
       Parameter("MaximumMemoryGb", p.maximumMemoryGb, {0, Unlimited}, "GB",
                 "Refuse what needs more memory beside the volumes, in 10^9 bytes. 0: three quarters of the machine's memory.")
+          .Advanced(),
+      Parameter("PlanStep", p.planStep, {0, 64}, "voxels of the output",
+                "Membranes are found on a grid whose voxels are so much larger, and interpolated. 1: at every voxel; 0: 2 where "
+                "overlaps are 12 voxels thick or more, where it makes no difference that can be seen, else 1.")
+          .When("Method", "membrane")
           .Advanced(),
       Parameter("MembraneTolerance", p.membraneTolerance, {0, 1, true}, "", "Largest error of the weights of two volumes."),
   };
@@ -175,16 +196,25 @@ void StitchPlan::Parts::ScaleRow(int volume, int j, int k, int first, int end, c
 
 void StitchPlan::Parts::FindScales(const Progress& progress)
 {
-  const ImageGeometry planGrid = Coarsened(grid, factor);
-  std::vector<StitchSampler> coarser;
-  if (factor > 1)
-    for (const StitchInput& input : inputs)
-      coarser.emplace_back(input, planGrid, parameters.reliabilityFloor);
-  RegionMap regions(MasksOf(factor > 1 ? coarser : samplers, progress.Part(0.0, 0.15)), planGrid.dimensions, planGrid.spacing,
-                    progress.Part(0.15, 0.2));
-  if (factor == 1)
-    CheckRegions(parameters, inputs, regions);
   const StitchMethod method = parameters.method;
+  const auto regionsOf = [&](int step, const Progress& part) {
+    const ImageGeometry where = Coarsened(grid, step);
+    std::vector<StitchSampler> coarser;
+    for (std::size_t v = 0; v < inputs.size() && step > 1; ++v)
+      coarser.emplace_back(inputs[v], where, parameters.reliabilityFloor);
+    return RegionMap(MasksOf(step > 1 ? coarser : samplers, part.Part(0.0, 0.75)), where.dimensions, where.spacing,
+                     part.Part(0.75, 1.0));
+  };
+  const bool isTried = method == StitchMethod::Membrane && parameters.planStep == 0 && factor == 1;
+  if (isTried)
+    factor = 2;
+  RegionMap regions = regionsOf(factor, progress.Part(0.0, isTried ? 0.03 : 0.2));
+  if (isTried && !AreOverlapsThick(regions, thickOverlap / 2.0)) {
+    factor = 1;
+    regions = regionsOf(1, progress.Part(0.03, 0.2));
+  }
+  CheckRegions(parameters, inputs, regions, samplers);
+  const ImageGeometry planGrid = Coarsened(grid, factor);
   if (method == StitchMethod::Distance || method == StitchMethod::Membrane)
     regions.GiveCores(progress.Part(0.2, 0.3));
   scales = StitchScales(parameters, regions, planGrid.spacing, bound, progress.Part(0.3, 0.85));

@@ -39,7 +39,10 @@ struct StitchParameters {
   double reliabilityFloor = 0.01;
   bool allowDisjoint = false;
   double maximumMemoryGb = 0.0;
-  /// Largest error of the weights of two volumes that comes from their membrane, certified for exponents from 1 to 32.
+  int planStep =
+      0; ///< voxels of the output between those of the grid that membranes are found on; 0: 2 where that is fine enough
+  /// Largest error of the weights of two volumes that comes from their membrane on its grid, certified for exponents from 1
+  /// to 32.
   double membraneTolerance = 1.0 / 512;
 };
 
@@ -88,8 +91,9 @@ struct StitchOutputs {
 /// L, D = sum h H / sqrt(sum h_i h_j rho_ij), h the weights of the details and rho the measured correlation of two volumes'
 /// details: what a mixture of independent textures loses is given back, and what they share is not doubled.
 ///
-/// When memory is short the global part is found on a grid that is coarser by a whole factor (StitchCost), and interpolated;
-/// where volumes are is always known exactly.
+/// Membranes are so smooth that every other voxel tells them where overlaps are thick, and when memory is short any global part
+/// is found on a grid that is coarser by a whole factor (StitchCost): it is interpolated; where volumes are is always known
+/// exactly.
 class StitchPlan {
 public:
   /// Volumes and displacements must outlive the plan.

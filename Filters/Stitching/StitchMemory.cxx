@@ -83,15 +83,17 @@ StitchCost CostOfStitch(const StitchParameters& parameters, const std::vector<Im
   cost.outputBytes = cost.voxelBytes * voxels;
   cost.allowedBytes = AllowedMemory(parameters);
   const double full = PlanBytes(parameters, boxes, grid);
-  cost.planBytes = full;
+  const auto plan = [&](int factor) {
+    cost.planFactor = factor;
+    cost.planBytes = full;
+    for (int axis = 0; axis < 3; ++axis)
+      cost.planBytes /= std::min(factor, grid.dimensions[axis]);
+  };
+  plan(parameters.method == StitchMethod::Membrane ? std::max(1, parameters.planStep) : 1);
   const auto fits = [&] { return cost.planBytes <= (cost.planFactor == 1 ? 0.75 : 0.5) * cost.allowedBytes; };
   if (cost.WholeBytes() > cost.allowedBytes)
-    while (!fits() && cost.planFactor < 64) {
-      ++cost.planFactor;
-      cost.planBytes = full;
-      for (int axis = 0; axis < 3; ++axis)
-        cost.planBytes /= std::min(cost.planFactor, grid.dimensions[axis]);
-    }
+    while (!fits() && cost.planFactor < 64)
+      plan(cost.planFactor + 1);
   const double slice = cost.voxelBytes * grid.dimensions[0] * grid.dimensions[1];
   const double slices = std::floor((cost.allowedBytes - cost.planBytes) / slice);
   cost.slabs = slices >= 1.0 ? static_cast<int>(std::ceil(grid.dimensions[2] / std::min<double>(slices, grid.dimensions[2]))) : 0;

@@ -136,4 +136,29 @@ std::vector<Boxed<unsigned char>> MasksOf(const std::vector<StitchSampler>& samp
   return masks;
 }
 
+Presence PresenceOf(const std::vector<StitchSampler>& samplers, std::size_t volume)
+{
+  Presence found;
+  const GridBox& own = samplers[volume].Box();
+  std::vector<unsigned char> inside(static_cast<std::size_t>(own.size[0])), other;
+  for (int k = own.first[2]; k < own.first[2] + own.size[2] && !found.isShared; ++k)
+    for (int j = own.first[1]; j < own.first[1] + own.size[1] && !found.isShared; ++j) {
+      samplers[volume].Inside(j, k, inside.data());
+      found.isInside = found.isInside || std::any_of(inside.begin(), inside.end(), [](unsigned char mask) { return mask & 1; });
+      for (std::size_t u = 0; u < samplers.size() && !found.isShared; ++u) {
+        const GridBox& box = samplers[u].Box();
+        if (u == volume || !box.HasRow(j, k))
+          continue;
+        other.resize(static_cast<std::size_t>(box.size[0]));
+        samplers[u].Inside(j, k, other.data());
+        const int first = std::max(own.first[0], box.first[0]);
+        const int end = std::min(own.first[0] + own.size[0], box.first[0] + box.size[0]);
+        for (int i = first; i < end && !found.isShared; ++i)
+          found.isShared =
+              (inside[static_cast<std::size_t>(i - own.first[0])] & other[static_cast<std::size_t>(i - box.first[0])] & 1) != 0;
+      }
+    }
+  return found;
+}
+
 } // namespace echorama

@@ -66,4 +66,10 @@ private:
 /// The masks of volumes in a grid.
 std::vector<Boxed<unsigned char>> MasksOf(const std::vector<StitchSampler>& samplers, const Progress& progress);
 
+/// Whether any voxel of a volume is in the grid, and whether any is in an overlap.
+struct Presence {
+  bool isInside = false, isShared = false;
+};
+Presence PresenceOf(const std::vector<StitchSampler>& samplers, std::size_t volume);
+
 } // namespace echorama

@@ -27,8 +27,9 @@
  * array `Reliability` (vtkUltrasoundReliabilityMap: shadows, saturation) is weighted by it as well.
  *
  * The filter makes the extent that is asked for and no more: what is global (how volumes share the overlaps, gains) is found
- * once and kept until the inputs or a parameter change, so slabs or pieces are those of the whole to the last bit. When the
- * memory that is allowed does not suffice, the global part is found on a coarser grid (GetPlanFactor).
+ * once and kept until the inputs or a parameter change, so slabs or pieces are those of the whole to the last bit. Where overlaps
+ * are thick (PlanStep), and when the memory that is allowed does not suffice, the global part is found on a coarser grid
+ * (GetPlanFactor).
  *
  * Refuses, with a message: fewer than two volumes, a volume that overlaps no other (see AllowDisjoint), one with no real
  * voxels, a bad geometry or type, and a result that needs more memory than allowed.
@@ -125,6 +126,13 @@ public:
   vtkUltrasoundNumberMacro(MaximumMemoryGb);
 
   /**
+   * Membranes are found on a grid whose voxels are so much larger, and interpolated. 1: at every voxel; 0: 2 where overlaps are
+   * 12 voxels thick or more, where it makes no difference that can be seen, else 1. Used when Method is membrane. In [0, 64]
+   * voxels of the output; default 0.
+   */
+  vtkUltrasoundIntegerMacro(PlanStep);
+
+  /**
    * Edge of the cubic voxels of the output. 0: the smallest spacing of the volumes, axis by axis where they all share their
    * directions. At least 0 mm; default 0.
    */
@@ -163,7 +171,7 @@ public:
 
   ///@{
   /** Of the last update: the factor of the grid on which what is global was found (1: the output's own), and how far the
-   * scales of the membranes can be from the exact ones (certified; 0 without membranes). */
+   * scales of the membranes can be from the exact ones of that grid (certified; 0 without membranes). */
   int GetPlanFactor() const { return this->PlanFactor; }
   double GetMembraneBound() const { return this->MembraneBound; }
   ///@}

@@ -449,32 +449,34 @@ void Measure(const Case& scene, const Wanted& wanted)
     StitchMethod method;
     StitchTexture texture;
     double detailSharpness;
+    int planStep;
   };
   // Details that change over as widely as the smooth part are the mean of all, amplified: "restore".
   const double narrow = StitchParameters().detailSharpness, wide = StitchParameters().sharpness;
   const Contender contenders[] = {
-      {"average", StitchMethod::Average, StitchTexture::Mix, narrow},
-      {"feather", StitchMethod::Feather, StitchTexture::Mix, narrow},
-      {"maximum", StitchMethod::Maximum, StitchTexture::Mix, narrow},
-      {"distance", StitchMethod::Distance, StitchTexture::Mix, narrow},
-      {"membrane", StitchMethod::Membrane, StitchTexture::Mix, narrow},
-      {"distance restore", StitchMethod::Distance, StitchTexture::Split, wide},
-      {"distance split", StitchMethod::Distance, StitchTexture::Split, narrow},
-      {"membrane restore", StitchMethod::Membrane, StitchTexture::Split, wide},
-      {"membrane split", StitchMethod::Membrane, StitchTexture::Split, narrow},
+      {"average", StitchMethod::Average, StitchTexture::Mix, narrow, 0},
+      {"feather", StitchMethod::Feather, StitchTexture::Mix, narrow, 0},
+      {"maximum", StitchMethod::Maximum, StitchTexture::Mix, narrow, 0},
+      {"distance", StitchMethod::Distance, StitchTexture::Mix, narrow, 0},
+      {"membrane", StitchMethod::Membrane, StitchTexture::Mix, narrow, 0},
+      {"distance restore", StitchMethod::Distance, StitchTexture::Split, wide, 0},
+      {"distance split", StitchMethod::Distance, StitchTexture::Split, narrow, 0},
+      {"membrane restore", StitchMethod::Membrane, StitchTexture::Split, wide, 0},
+      {"membrane split", StitchMethod::Membrane, StitchTexture::Split, narrow, 0},
+      {"membrane split, PlanStep 1", StitchMethod::Membrane, StitchTexture::Split, narrow, 1},
   };
-  const auto with = [&scene](StitchMethod method, StitchTexture texture, double detailSharpness) {
+  const auto with = [&scene](const Contender& contender) {
     StitchParameters parameters;
-    parameters.method = method;
-    parameters.texture = texture;
-    parameters.detailSharpness = detailSharpness;
+    parameters.method = contender.method;
+    parameters.texture = contender.texture;
+    parameters.detailSharpness = contender.detailSharpness;
+    parameters.planStep = contender.planStep;
     return [&scene, parameters] { return Stitched(scene, parameters); };
   };
-  const std::function<Result()> average = with(StitchMethod::Average, StitchTexture::Mix, narrow);
+  const std::function<Result()> average = with(contenders[0]);
   for (const Contender& contender : contenders)
     if (Wanted::Has(wanted.methods, contender.name))
-      Contest(scene, contender.name, with(contender.method, contender.texture, contender.detailSharpness), average, wanted.runs,
-              tbb::info::default_concurrency());
+      Contest(scene, contender.name, with(contender), average, wanted.runs, tbb::info::default_concurrency());
   for (const auto& [name, stitch] :
        {std::pair("multiband", StitchByMultiband), std::pair("offset", StitchByOffsets), std::pair("seam", StitchBySeams)})
     if (Wanted::Has(wanted.methods, name))

@@ -123,6 +123,34 @@ bool IsPure(const RegionMap& regions, int v, int i, int j, int k)
 
 } // namespace
 
+TEST(RegionMap, ThicknessIsTwiceTheVoxelsOverTheFaces)
+{
+  Random random(7);
+  const int sides[3][3] = {{-1, 0, 0}, {0, -1, 0}, {0, 0, -1}};
+  for (int trial = 0; trial < 8; ++trial) {
+    const Scene scene =
+        RandomScene(trial % 4 == 0 ? std::array<int, 3>{30, 24, 1} : std::array<int, 3>{24, 20, 17}, {1.0, 1.0, 1.0}, 3, random);
+    const RegionMap regions = scene.Regions();
+    for (int v = 0; v < 3; ++v) {
+      std::ptrdiff_t voxels = 0, faces = 0;
+      scene.ForAll([&](int i, int j, int k) {
+        const bool shared = scene.Is(Region::Overlap, v, i, j, k);
+        voxels += shared;
+        for (const auto& [x, y, z] : sides) {
+          if (i + x < 0 || j + y < 0 || k + z < 0)
+            continue;
+          const bool beside = scene.Is(Region::Overlap, v, i + x, j + y, k + z);
+          const auto known = [&](int a, int b, int c) {
+            return scene.Is(Region::Pure, v, a, b, c) || scene.Is(Region::Empty, v, a, b, c);
+          };
+          faces += (shared && known(i + x, j + y, k + z)) || (beside && known(i, j, k));
+        }
+      });
+      EXPECT_EQ(regions.OverlapThickness(v), voxels == 0 ? 0.0 : 2.0 * static_cast<double>(voxels) / static_cast<double>(faces));
+    }
+  }
+}
+
 TEST(RegionMap, RegionsAreTheBooleanOnes)
 {
   Random random(11);

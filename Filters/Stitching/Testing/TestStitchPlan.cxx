@@ -217,6 +217,52 @@ TEST(StitchPlan, MembranesOfTwoSlabsAreARamp)
     EXPECT_NEAR(result.intensity.View()(i, 5, 4), i < 20 ? 0.0 : i >= 30 ? 11.0 : i - 19.0, 11.0 / 512) << i;
 }
 
+TEST(StitchPlan, MembranesOfThickOverlapsAreFoundAtEveryOtherVoxel)
+{
+  // The same ramp, however the overlap lies in the coarser grid: off by one voxel of it at most, and monotonous.
+  for (const int first : {20, 21}) {
+    Scene<float> scene;
+    scene.AddBox({0, 0, 0}, {60, 30, 24}, 0.0f);
+    scene.AddBox({first, 0, 0}, {60, 30, 24}, 100.0f);
+    StitchParameters parameters = With(StitchMethod::Membrane, 1.0);
+    const int overlap = 60 - first;
+    const Result<float> result = Stitched(scene, parameters);
+    EXPECT_EQ(StitchPlan(parameters, scene.inputs, result.grid, {}).Factor(), 2);
+    parameters.planStep = 1;
+    EXPECT_EQ(StitchPlan(parameters, scene.inputs, result.grid, {}).Factor(), 1);
+    const auto shown = [&](int i) { return result.intensity.View()(i, 15, 12); };
+    for (int i = 0; i < first + 60; ++i) {
+      const double ramp = std::clamp(100.0 * (i - first + 1) / (overlap + 1), 0.0, 100.0);
+      EXPECT_NEAR(shown(i), ramp, 100.0 / overlap) << i;
+      EXPECT_TRUE(i == 0 || shown(i) >= shown(i - 1)) << i;
+      if (i < first || i >= 60) {
+        EXPECT_EQ(shown(i), ramp) << "who is alone shows nothing of others";
+      }
+    }
+  }
+  Scene<float> thin;
+  thin.AddBox({0, 0, 0}, {60, 30, 24}, 0.0f);
+  thin.AddBox({50, 0, 0}, {60, 30, 24}, 100.0f);
+  EXPECT_EQ(StitchPlan(With(StitchMethod::Membrane, 1.0), thin.inputs, StitchGrid(thin.geometries), {}).Factor(), 1);
+}
+
+TEST(StitchPlan, ACoarsePlanKnowsThinOverlapsFromNone)
+{
+  // A single layer of voxels between those that the coarser grid looks at.
+  Scene<float> touching, apart;
+  for (Scene<float>* scene : {&touching, &apart})
+    scene->AddBox({0, 0, 0}, {30, 30, 30}, 10.0f);
+  touching.AddBox({29, 0, 0}, {30, 30, 30}, 20.0f);
+  apart.AddBox({30, 0, 0}, {30, 30, 30}, 20.0f);
+  StitchParameters parameters = With(StitchMethod::Membrane, 1.0);
+  parameters.planStep = 4;
+  const StitchPlan plan(parameters, touching.inputs, StitchGrid(touching.geometries), {});
+  EXPECT_EQ(plan.Factor(), 4);
+  EXPECT_THROW(StitchPlan(parameters, apart.inputs, StitchGrid(apart.geometries), {}), Error);
+  parameters.allowDisjoint = true;
+  EXPECT_NO_THROW(StitchPlan(parameters, apart.inputs, StitchGrid(apart.geometries), {}));
+}
+
 TEST(StitchPlan, TextureIsKeptWhereVolumesAreIndependent)
 {
   Scene<float> scene;
