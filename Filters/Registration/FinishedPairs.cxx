@@ -11,7 +11,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* Schema = "echorama-finished-pairs-1"; // a new one whenever AlignPair finds something else
+constexpr const char* Schema = "echorama-finished-pairs-1"; // of the file; what pairs depend on is in their keys
 constexpr double SecondsBetweenWrites = 5.0;
 constexpr std::size_t LargestFile = std::size_t{1} << 30;
 constexpr int Verdicts = 3;
@@ -119,7 +119,7 @@ std::string FinishedPairs::KeyOf(const PlacedVolume& fixed, const std::string& f
 {
   if (path_.empty() || fixedContent.empty() || movingContent.empty())
     return {};
-  Json key = Json::array();
+  Json key = Json::array({ECHORAMA_VERSION}); // another version may find something else
   for (const PlacedVolume* volume : {&fixed, &moving}) {
     Json landmarks = Json::array();
     for (const Landmark& landmark : volume->landmarks)

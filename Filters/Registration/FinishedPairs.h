@@ -23,8 +23,8 @@ public:
   FinishedPairs(const FinishedPairs&) = delete;
   FinishedPairs& operator=(const FinishedPairs&) = delete;
 
-  /// Of two volumes with these contents (VolumeOnDemand) at these poses. Empty, and then nothing is remembered, without a file
-  /// or where a content is not known.
+  /// Of two volumes with these contents (VolumeOnDemand) at these poses, for this version of Echorama. Empty, and then nothing is
+  /// remembered, without a file or where a content is not known.
   std::string KeyOf(const PlacedVolume& fixed, const std::string& fixedContent, const PlacedVolume& moving,
                     const std::string& movingContent, const AlignPairParameters& parameters) const;
 

@@ -71,12 +71,36 @@ void Smooth(Volume<float>& volume)
                 [&](std::ptrdiff_t row) { RowSmoother(n[0]).Along(to.Row(static_cast<int>(row), 0), to.SliceStride(), n[2]); });
 }
 
+// Whether each voxel of a row is shared, told by every \a step-th. \returns whether any is.
+bool SharedRow(const std::vector<unsigned char>& covered, int first, int step, std::vector<unsigned char>& shared)
+{
+  int any = 0;
+  std::size_t i = 0, left = static_cast<std::size_t>(step - first % step); // until the next that is told
+  for (const unsigned char count : covered) {
+    const unsigned char here = count > 1 ? 1 : 0;
+    any |= here;
+    for (const std::size_t end = std::min(shared.size(), i + left); i < end; ++i)
+      shared[i] = here;
+    left = static_cast<std::size_t>(step);
+  }
+  std::fill(shared.begin() + static_cast<std::ptrdiff_t>(i), shared.end(), covered.back() > 1 ? 1 : 0);
+  return any != 0;
+}
+
 // Of where the volume is (bit 0), what it shares.
-ECHORAMA_HOT void KeepShared(const unsigned char* coverage, int count, unsigned char* __restrict inside)
+ECHORAMA_HOT void KeepShared(const unsigned char* shared, int count, unsigned char* __restrict inside)
 {
   for (int i = 0; i < count; ++i)
-    inside[i] &= coverage[i] > 1 ? 1 : 0;
+    inside[i] &= shared[i];
 }
+
+ECHORAMA_HOT void AddSquaredDifferences(const float* a, const float* b, std::ptrdiff_t count, float* __restrict to)
+{
+  for (std::ptrdiff_t i = 0; i < count; ++i)
+    to[i] += (a[i] - b[i]) * (a[i] - b[i]);
+}
+
+constexpr std::ptrdiff_t blocksOfOneTask = 1 << 15;
 
 // Adds a row of voxels to the sums of its columns, in double: the mean of equal floats is that float.
 ECHORAMA_HOT void AddColumns(const float* value, const unsigned char* inside, int count, double* __restrict sum,
@@ -127,7 +151,7 @@ SmoothPart LowPass(const StitchSampler& volume, const BlockLattice& blocks, cons
   const std::ptrdiff_t rows = static_cast<std::ptrdiff_t>(low.box.size[1]) * low.box.size[2];
   ParallelRanges(rows, 1, progress, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     const std::size_t count = static_cast<std::size_t>(own.size[0]);
-    std::vector<unsigned char> inside(count);
+    std::vector<unsigned char> inside(count), shared(count);
     const auto column = [&](int i) { return std::min(i / step, coverage.Dimensions()[0] - 1); };
     const int start = column(own.first[0]);
     std::vector<unsigned char> covered(static_cast<std::size_t>(column(own.first[0] + own.size[0] - 1) - start + 1));
@@ -147,15 +171,13 @@ SmoothPart LowPass(const StitchSampler& volume, const BlockLattice& blocks, cons
         for (int j = std::max(bj * blocks.size[1], own.first[1]); j < last(bj, 1); ++j) {
           coverage.Copy(start, std::min(j / step, coverage.Dimensions()[1] - 1), std::min(k / step, coverage.Dimensions()[2] - 1),
                         static_cast<int>(covered.size()), covered.data());
+          if (!SharedRow(covered, own.first[0], step, shared))
+            continue;
           if (mask)
             std::copy_n(mask->Row(j, k), count, inside.begin());
           else
             volume.Inside(j, k, inside.data());
-          if (step == 1)
-            KeepShared(covered.data(), own.size[0], inside.data());
-          else
-            for (int i = 0; i < own.size[0]; ++i)
-              inside[i] &= covered[static_cast<std::size_t>(column(own.first[0] + i) - start)] > 1;
+          KeepShared(shared.data(), own.size[0], inside.data());
           if (!std::memchr(inside.data(), 1, count))
             continue;
           any = true;
@@ -184,15 +206,15 @@ SmoothPart LowPass(const StitchSampler& volume, const BlockLattice& blocks, cons
   const Volume<float> means = low.values;
   Smooth(low.values);
   // Around the smooth part, not around the means: what the filter took from these belongs to the details.
-  auto square = part.deviation.values.View();
-  for (std::ptrdiff_t block = 0; block < square.Size(); ++block) {
-    const float beside = means.View()[block] - low.values.View()[block];
-    square[block] += beside * beside;
-  }
+  const auto square = part.deviation.values.View();
+  ParallelRanges(square.Size(), blocksOfOneTask, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    AddSquaredDifferences(&means.View()[begin], &low.values.View()[begin], end - begin, &square[begin]);
+  });
   for (int round = 0; round < deviationRounds; ++round)
     Smooth(part.deviation.values);
-  for (float& value : square)
-    value = std::sqrt(value);
+  ParallelRanges(square.Size(), blocksOfOneTask, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    std::transform(&square[begin], &square[begin] + (end - begin), &square[begin], [](float value) { return std::sqrt(value); });
+  });
   return part;
 }
 

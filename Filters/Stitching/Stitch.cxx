@@ -190,6 +190,8 @@ void StitchPlan::Parts::ScaleRow(int volume, int j, int k, int first, int end, c
     return;
   }
   const int from = std::max(first, field.spans->First(j, k)), to = std::min(end, field.spans->End(j, k));
+  if (from > first || to < end)
+    std::fill(scale, scale + (end - first), 1.0f);
   if (from < to)
     std::copy(row + (from - field.spans->First(j, k)), row + (to - field.spans->First(j, k)), scale + (from - first));
 }
@@ -481,7 +483,6 @@ private:
 
   void SampleOverlap(int j, int k, const unsigned char* coverage)
   {
-    const int n = box_.size[0];
     for (const int v : rows_) {
       Layer& layer = layers_[v];
       layer.shared.assign(width_, 0);
@@ -500,9 +501,12 @@ private:
       layer.shown.resize(width_);
       layer.weight.resize(width_);
       ApplyGain(layer.Value(first), gain, offset, count, layer.shown.data() + first);
-      layer.scale.assign(width_, 1.0f);
+      layer.scale.resize(width_);
+      const int x = box_.first[0];
       if (!parts_.scales.empty() || !parts_.scaleSamplers.empty())
-        parts_.ScaleRow(v, j, k, box_.first[0], box_.first[0] + n, layer.shared.data(), layer.scale.data());
+        parts_.ScaleRow(v, j, k, x + first, x + end, layer.shared.data() + first, layer.scale.data() + first);
+      else
+        std::fill_n(layer.scale.data() + first, count, 1.0f);
       if (parts_.samplers[v].HasTrust()) {
         layer.trust.resize(layer.inside.size());
         parts_.samplers[v].Trust(j, k, layer.inside.data(), layer.trust.data());
@@ -514,16 +518,15 @@ private:
       layer.deviation.resize(width_);
       A* const low = layer.low.data();
       float* const deviation = layer.deviation.data();
-      const int x = box_.first[0];
       const unsigned char* const wanted = layer.shared.data();
       if (!layer.lows) {
         layer.lows = std::make_unique<SmoothRows<A>>(parts_.blocks, parts_.lows[v].low);
         layer.deviations = std::make_unique<SmoothRows<float>>(parts_.blocks, parts_.lows[v].deviation);
       }
       if (!layer.lows->Row(j, k, x + first, x + end, wanted + first, low + first))
-        parts_.lowSamplers[v].Row(j, k, x, x + n, wanted, noValue, low);
+        parts_.lowSamplers[v].Row(j, k, x + first, x + end, wanted + first, noValue, low + first);
       if (!layer.deviations->Row(j, k, x + first, x + end, wanted + first, deviation + first))
-        parts_.deviationSamplers[v].Row(j, k, x, x + n, wanted, 0.0f, deviation);
+        parts_.deviationSamplers[v].Row(j, k, x + first, x + end, wanted + first, 0.0f, deviation + first);
       ApplyGain(low + first, gain, offset, count, low + first);
       ApplyGain(deviation + first, static_cast<float>(gain), 0.0f, count, deviation + first);
       for (int i = first; i < end; ++i) // without a smooth part (an overlap thinner than the plan's voxels) all is smooth
