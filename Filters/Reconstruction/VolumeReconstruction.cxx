@@ -17,6 +17,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/SizeText.h"
+#include "Core/Base/ZeroedMemory.h"
 #include "Core/Imaging/RoundedVoxel.h"
 #include "Core/Imaging/VoxelTypes.h"
 #include "ReconstructionFrame.h"
@@ -131,7 +132,7 @@ struct VolumeReconstruction<T>::Body {
   ImageGeometry grid;
   ReconstructionOutput<T> output;
   Eigen::Affine3d worldToIndex;
-  std::vector<Cell> cells, latest;         // latest: of the frame at hand (Latest, Alpha)
+  Zeroed<Cell> cells, latest;              // latest: of the frame at hand (Latest, Alpha)
   std::vector<int> touchedFrom, touchedTo; // per row of voxels
   ReconstructionFrame<T> previous, current;
   bool hasPrevious = false;
@@ -171,10 +172,10 @@ struct VolumeReconstruction<T>::Body {
   bool SplatSlab(const std::vector<Plane<T>>& planes, int axis, int lower, int upper);
   template <bool flush, Compounding how>
   bool NearestRow(const Plane<T>& plane, const PixelSpan& span, int axis, int lower, int upper, float* values,
-                  std::vector<Cell>& target);
+                  Zeroed<Cell>& target);
   template <bool flush, Compounding how>
   bool LinearRow(const Plane<T>& plane, const PixelSpan& span, int axis, int lower, int upper, float* values,
-                 std::vector<Cell>& target);
+                 Zeroed<Cell>& target);
   void LayOver(Cell& cell, Cell& fresh) const;
   bool Blend(const ReconstructionFrame<T>& a, const ReconstructionFrame<T>& b);
   void Write(int axis, int lower, int upper);
@@ -196,7 +197,7 @@ void VolumeReconstruction<T>::Body::LayOver(Cell& cell, Cell& fresh) const
 template <class T>
 template <bool flush, Compounding how>
 bool VolumeReconstruction<T>::Body::NearestRow(const Plane<T>& plane, const PixelSpan& span, int axis, int lower, int upper,
-                                               float* values, std::vector<Cell>& target)
+                                               float* values, Zeroed<Cell>& target)
 {
   Fixed first[3], step[3];
   int begin = span.begin, end = span.end;
@@ -250,7 +251,7 @@ bool VolumeReconstruction<T>::Body::NearestRow(const Plane<T>& plane, const Pixe
 template <class T>
 template <bool flush, Compounding how>
 bool VolumeReconstruction<T>::Body::LinearRow(const Plane<T>& plane, const PixelSpan& span, int axis, int lower, int upper,
-                                              float* values, std::vector<Cell>& target)
+                                              float* values, Zeroed<Cell>& target)
 {
   Fixed first[3], step[3];
   int begin = span.begin, end = span.end;
@@ -352,7 +353,7 @@ bool VolumeReconstruction<T>::Body::SplatSlab(const std::vector<Plane<T>>& plane
       const double begin = edge + plane.map.column[axis] * span.begin, end = edge + plane.map.column[axis] * (span.end - 1);
       if (std::max(begin, end) < lower - 1.5 || std::min(begin, end) > upper + 0.5)
         continue;
-      std::vector<Cell>& target = byFrame ? latest : cells;
+      Zeroed<Cell>& target = byFrame ? latest : cells;
       if constexpr (splat == SplatMethod::Nearest)
         any |= NearestRow<false, put>(plane, span, axis, lower, upper, values.data(), target);
       else
@@ -577,9 +578,9 @@ VolumeReconstruction<T>::VolumeReconstruction(const ReconstructionParameters& pa
   if (parameters.stepMm == 0.0)
     body.parameters.stepMm = 0.7 * grid.spacing.minCoeff();
   const std::size_t voxels = grid.VoxelCount(), rows = static_cast<std::size_t>(body.RowOf(0, grid.dimensions[2]));
-  body.cells.resize(voxels);
+  body.cells = Zeroed<Cell>(voxels);
   if (parameters.compounding == Compounding::Latest || parameters.compounding == Compounding::Alpha)
-    body.latest.resize(voxels);
+    body.latest = Zeroed<Cell>(voxels);
   body.touchedFrom.assign(rows, grid.dimensions[0]);
   body.touchedTo.assign(rows, -1);
   std::fill(output.intensity.begin(), output.intensity.end(), T(0));
