@@ -47,16 +47,20 @@ constexpr double thickOverlap = 12.0;
 void CheckRegions(const StitchParameters& parameters, const std::vector<StitchInput>& inputs, const RegionMap& regions,
                   const std::vector<StitchSampler>& samplers)
 {
+  // Of two volumes one of which is empty it is that one which is told of, not the other, which then overlaps nothing.
+  int alone = -1;
   for (int v = 0; v < regions.Count(); ++v) {
     if (regions.OverlapCount(v) > 0 || (parameters.allowDisjoint && regions.InsideCount(v) > 0))
       continue;
     const Presence presence = PresenceOf(samplers, static_cast<std::size_t>(v));
     if (!presence.isInside)
       throw Error(Error::Kind::BadInput, inputs[v].name + ": no voxel is valid and finite at a voxel of the output grid");
-    if (!presence.isShared && !parameters.allowDisjoint)
-      throw Error(Error::Kind::NotPossible,
-                  inputs[v].name + " overlaps no other volume; check its pose, or set AllowDisjoint to put it where it is");
+    if (!presence.isShared && !parameters.allowDisjoint && alone < 0)
+      alone = v;
   }
+  if (alone >= 0)
+    throw Error(Error::Kind::NotPossible,
+                inputs[alone].name + " overlaps no other volume; check its pose, or set AllowDisjoint to put it where it is");
 }
 
 bool AreOverlapsThick(const RegionMap& regions, double voxels)

@@ -487,6 +487,10 @@ TEST(Stitch, RefusesWithTheReason)
 
   ImageGeometry geometry;
   geometry.dimensions = {10, 10, 3};
+  Scene<float> withEmpty;
+  withEmpty.AddBox({0, 0, 0}, {10, 10, 3}, 1.0f);
+  withEmpty.Add(Volume<float>(geometry.dimensions), Volume<unsigned char>(geometry.dimensions, 0), geometry);
+  EXPECT_NE(ErrorOf(withEmpty).find("volume 2: no voxel is valid"), std::string::npos) << "not that volume 1 overlaps none";
   scene.Add(Volume<float>(geometry.dimensions), Volume<unsigned char>(geometry.dimensions, 0), geometry);
   EXPECT_NE(ErrorOf(scene, parameters).find("volume 4: no voxel is valid and finite"), std::string::npos);
 }
