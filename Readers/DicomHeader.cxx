@@ -3,8 +3,8 @@
 // picture; the others by DicomPixels.h.
 #include "Readers/DicomHeader.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/FormatText.h"
 #include "Core/Base/NumberText.h"
-#include "Core/Base/SizeText.h"
 #include "Core/Geometry/MatrixRows.h"
 #include "Readers/DicomElements.h"
 #include <algorithm>

@@ -3,9 +3,9 @@
 // of its own size and from there, as grey, into the volume.
 #include "Readers/ImageStackFile.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/FormatText.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
-#include "Core/Base/SizeText.h"
 #include "Readers/DataFile.h"
 #include "Readers/PictureFile.h"
 #include <algorithm>

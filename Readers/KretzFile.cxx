@@ -17,8 +17,8 @@
 #include "Readers/KretzFile.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/FormatText.h"
 #include "Core/Base/NumberText.h"
-#include "Core/Base/SizeText.h"
 #include "Core/Imaging/ScanConversion.h"
 #include "Readers/DataFile.h"
 #include <algorithm>

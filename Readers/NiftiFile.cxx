@@ -7,8 +7,8 @@
 // Compressed time series are inflated in order; going back to an earlier volume starts over.
 #include "Readers/NiftiFile.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/FormatText.h"
 #include "Core/Base/NumberText.h"
-#include "Core/Base/SizeText.h"
 #include "Core/Base/Words.h"
 #include "Readers/AffinePose.h"
 #include "Readers/Compression.h"

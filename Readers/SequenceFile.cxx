@@ -12,7 +12,7 @@
 #include "Readers/SequenceFile.h"
 #include "Core/Base/ByteOrder.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/SizeText.h"
+#include "Core/Base/FormatText.h"
 #include "Core/Base/Words.h"
 #include "Readers/Compression.h"
 #include "Readers/DataFile.h"

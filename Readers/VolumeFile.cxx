@@ -4,7 +4,7 @@
 #include "Readers/VolumeFile.h"
 #include "Core/Base/ByteOrder.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/SizeText.h"
+#include "Core/Base/FormatText.h"
 #include "Readers/Compression.h"
 #include "Readers/DataFile.h"
 #include "Readers/HeaderLines.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // echorama embed: a stitched volume in a background of noise, as one scan of a real machine.
 #include "Commands.h"
-#include "Core/Base/SizeText.h"
+#include "Core/Base/FormatText.h"
 #include "Filters/Embedding/Feather.h"
 #include "ParameterOptions.h"
 #include "Readers/OutputFiles.h"

@@ -2,7 +2,7 @@
 // echorama stitch: many volumes become one. What fits into the allowed memory is made whole; larger results are made and written
 // slab by slab.
 #include "Commands.h"
-#include "Core/Base/SizeText.h"
+#include "Core/Base/FormatText.h"
 #include "Displacements.h"
 #include "Filters/Stitching/StitchJson.h"
 #include "ParameterOptions.h"

@@ -154,26 +154,4 @@ Pose MotionPath::At(double time) const
   return Interpolate(from.pose, after->pose, (time - from.time) / (after->time - from.time));
 }
 
-std::vector<Pose> MotionPath::At(const std::vector<double>& times) const
-{
-  std::vector<Pose> poses;
-  poses.reserve(times.size());
-  for (const double time : times)
-    poses.push_back(At(time));
-  return poses;
-}
-
-std::vector<double> MotionPath::EvenTimes(int count) const
-{
-  if (count < 1)
-    throw Error(Error::Kind::InvalidParameter,
-                "motion path: " + std::to_string(count) + " moments were asked for; at least 1 is needed");
-  std::vector<double> times;
-  for (int i = 0; i < count; ++i) {
-    const double t = count > 1 ? static_cast<double>(i) / (count - 1) : 0.5;
-    times.push_back(i > 0 && i == count - 1 ? LastTime() : FirstTime() + t * (LastTime() - FirstTime()));
-  }
-  return times;
-}
-
 } // namespace echorama

@@ -53,10 +53,6 @@ public:
   /// The pose at a moment. \throws Error(NotPossible) that names the moment, before the first pose, after the last, and within a
   /// gap that is too long.
   Pose At(double time) const;
-  std::vector<Pose> At(const std::vector<double>& times) const;
-
-  /// \a count moments, evenly from the first to the last; the middle when it is one. \throws Error(InvalidParameter) below 1.
-  std::vector<double> EvenTimes(int count) const;
 
 private:
   std::vector<TimedPose> poses_;

@@ -11,7 +11,6 @@
 #include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
-#include "vtkSmartPointer.h"
 #include "vtkUltrasoundVolume.h"
 
 #include <algorithm>
@@ -85,11 +84,8 @@ void vtkUltrasoundDisplacement::ImageOf(const echorama::DisplacementField& field
   array->SetName(DisplacementName());
   array->SetNumberOfComponents(3);
   array->SetNumberOfTuples(values.View().Size());
-  for (vtkIdType i = 0; i < values.View().Size(); ++i) {
-    array->SetTuple(i, values.View()[i].data());
-  }
-  image->GetPointData()->AddArray(array);
-  image->GetPointData()->SetActiveVectors(DisplacementName());
+  std::copy_n(values.View().Data()->data(), 3 * values.View().Size(), array->GetPointer(0));
+  image->GetPointData()->SetVectors(array);
 }
 
 //----------------------------------------------------------------------------

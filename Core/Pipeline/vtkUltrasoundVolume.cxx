@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "vtkUltrasoundVolume.h"
 
-#include "Core/Base/HugePages.h"
 #include "Core/Geometry/MatrixRows.h"
 #include "vtkAlgorithm.h"
 #include "vtkCompositeDataSet.h"
@@ -18,13 +17,14 @@
 #include "vtkNew.h"
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
-#include "vtkSmartPointer.h"
 #include "vtkStreamingDemandDrivenPipeline.h"
 #include "vtkStringArray.h"
 #include "vtkUltrasoundAcquisition.h"
 #include "vtkUltrasoundLandmarkField.h"
 
+#include <cstdint>
 #include <new>
+#include <sys/mman.h>
 
 using echorama::Error;
 
@@ -44,8 +44,12 @@ vtkSmartPointer<vtkDataArray> vtkUltrasoundVolume::NewArray(int vtkType, vtkIdTy
   auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(vtkType));
   array->SetName(name);
   array->SetNumberOfTuples(tuples);
-  const auto bytes = static_cast<std::size_t>(tuples) * static_cast<std::size_t>(array->GetDataTypeSize());
-  echorama::PreferHugePages(array->GetVoidPointer(0), bytes);
+  // On huge pages, before anybody writes to it (memory of our own: ZeroedMemory.h). What is advised begins with a page.
+  auto* const voxels = static_cast<char*>(array->GetVoidPointer(0));
+  const std::size_t bytes = static_cast<std::size_t>(tuples) * static_cast<std::size_t>(array->GetDataTypeSize());
+  if (const std::size_t before = (0 - reinterpret_cast<std::uintptr_t>(voxels)) % 65536; before < bytes) {
+    madvise(voxels + before, bytes - before, MADV_HUGEPAGE);
+  }
   return array;
 }
 

@@ -156,17 +156,6 @@ TEST(MotionPath, BridgesShortGapsAndRefusesLongOnes)
   }
   for (const double outside : {-0.001, 10.001, std::nan("")})
     EXPECT_THROW(path.At(outside), Error);
-  EXPECT_THROW(path.At(std::vector<double>{1.0, 7.0}), Error);
-}
-
-TEST(MotionPath, EvenTimesReachBothEnds)
-{
-  const MotionPath path({{0.1, Pose::Identity()}, {0.4, PoseOf({1, 2, 3}, {0, 0, 1})}});
-  EXPECT_EQ(path.EvenTimes(2), (std::vector<double>{0.1, 0.4}));
-  EXPECT_NEAR(path.EvenTimes(1)[0], 0.25, 1e-15);
-  const std::vector<double> times = path.EvenTimes(7);
-  EXPECT_EQ(path.At(times).size(), 7u);
-  EXPECT_THROW(path.EvenTimes(0), Error);
 }
 
 TEST(MotionPath, ASinglePoseIsAPath)

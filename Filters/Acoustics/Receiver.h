@@ -2,8 +2,8 @@
 #pragma once
 #include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
-#include "Core/Imaging/BeamEchoes.h"
 #include "Core/Imaging/VolumeView.h"
+#include "Filters/Phantoms/BeamEchoes.h"
 #include <cstdint>
 #include <vector>
 

@@ -10,7 +10,7 @@
 #include "Filters/Calibration/HandEye.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/Median.h"
+#include "Core/Base/Percentile.h"
 #include "Core/Base/SymmetricMatrix.h"
 #include "Filters/Calibration/CalibrationText.h"
 #include "Filters/Calibration/ConfidenceRadius.h"

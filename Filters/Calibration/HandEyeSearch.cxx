@@ -10,7 +10,7 @@
 // Cost: some 30 small eigenproblems, a handful of refinements and one for each round; 1.5 ms for 20 scans, and linear in their
 // number but for the logarithm.
 #include "Filters/Calibration/HandEyeSearch.h"
-#include "Core/Base/Median.h"
+#include "Core/Base/Percentile.h"
 #include "Core/Base/Random.h"
 #include "Core/Base/SymmetricMatrix.h"
 #include "Filters/Calibration/HandEyeClosedForms.h"

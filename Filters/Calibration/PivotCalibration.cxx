@@ -13,7 +13,7 @@
 #include "Filters/Calibration/PivotCalibration.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/Median.h"
+#include "Core/Base/Percentile.h"
 #include "Core/Base/Random.h"
 #include "Core/Base/SymmetricMatrix.h"
 #include "Core/Geometry/ToolPose.h"

@@ -3,9 +3,9 @@
 
 #include "BackgroundNoise.h"
 #include "BeamNoise.h"
+#include "Core/Base/FormatText.h"
 #include "Core/Base/Memory.h"
 #include "Core/Base/NumberText.h"
-#include "Core/Base/SizeText.h"
 #include "Core/Geometry/EnclosingFan.h"
 #include "Core/Imaging/Sampling.h"
 #include "Core/Imaging/ScanConversion.h"

@@ -3,8 +3,8 @@
 #include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Geometry/ProbeGeometry.h"
-#include "Core/Imaging/BeamEchoes.h"
 #include "Core/Imaging/VolumeView.h"
+#include "Filters/Phantoms/BeamEchoes.h"
 #include "PhantomScene.h"
 #include "ProbePress.h"
 #include <cstdint>

@@ -6,7 +6,6 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/FormatText.h"
 #include "Core/Base/Parallel.h"
-#include "Core/Base/SizeText.h"
 #include "Core/Geometry/ProbeFit.h"
 #include "Core/Imaging/VoxelTypes.h"
 #include <algorithm>

@@ -7,7 +7,6 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/FormatText.h"
 #include "Core/Base/Memory.h"
-#include "Core/Base/SizeText.h"
 #include "Core/Geometry/RigidTransform.h"
 #include "Filters/Reconstruction/VolumeReconstruction.h"
 #include <algorithm>

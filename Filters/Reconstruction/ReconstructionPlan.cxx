@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ReconstructionPlan.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/SizeText.h"
+#include "Core/Base/FormatText.h"
 #include "Core/Imaging/VoxelTypes.h"
 #include "Filters/Reconstruction/VolumeReconstruction.h"
 #include <algorithm>

@@ -15,8 +15,8 @@
 // the planes are one or two intervals between their roots.
 #include "VolumeReconstruction.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/FormatText.h"
 #include "Core/Base/Parallel.h"
-#include "Core/Base/SizeText.h"
 #include "Core/Base/ZeroedMemory.h"
 #include "Core/Imaging/RoundedVoxel.h"
 #include "Core/Imaging/VoxelTypes.h"

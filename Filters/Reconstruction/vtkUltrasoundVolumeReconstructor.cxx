@@ -2,7 +2,7 @@
 #include "vtkUltrasoundVolumeReconstructor.h"
 
 #include "Core/Base/Error.h"
-#include "Core/Base/SizeText.h"
+#include "Core/Base/FormatText.h"
 
 #include "vtkAlgorithmOutput.h"
 #include "vtkFieldData.h"

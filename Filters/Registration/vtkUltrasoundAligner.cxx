@@ -3,7 +3,7 @@
 
 #include "AlignmentJson.h"
 #include "Core/Base/Checksum.h"
-#include "Core/Base/SizeText.h"
+#include "Core/Base/FormatText.h"
 #include "Core/Geometry/MatrixRows.h"
 #include "Core/Sharing/ControllerWork.h"
 #include "PreparedVolume.h"

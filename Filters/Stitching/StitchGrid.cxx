@@ -4,7 +4,7 @@
 // is what keeps volumes of one lattice free of interpolation.
 #include "StitchGrid.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/SizeText.h"
+#include "Core/Base/FormatText.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>

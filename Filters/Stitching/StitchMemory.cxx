@@ -4,7 +4,6 @@
 #include "StitchMemory.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/FormatText.h"
-#include "Core/Base/SizeText.h"
 #include "RowSampler.h"
 #include "StitchGrid.h"
 #include <algorithm>

@@ -17,7 +17,7 @@
 #include "CameraFit.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/FormatText.h"
-#include "Core/Base/Median.h"
+#include "Core/Base/Percentile.h"
 #include "Core/Base/SymmetricMatrix.h"
 #include <algorithm>
 #include <array>

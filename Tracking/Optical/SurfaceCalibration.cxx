@@ -5,7 +5,7 @@
 #include "SurfaceCalibration.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/FormatText.h"
-#include "Core/Base/Median.h"
+#include "Core/Base/Percentile.h"
 #include <algorithm>
 #include <cmath>
 #include <numeric>

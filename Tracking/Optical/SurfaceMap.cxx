@@ -8,7 +8,6 @@
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/FormatText.h"
-#include "Core/Base/Median.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Percentile.h"
 #include "Core/Base/Random.h"

@@ -2,7 +2,7 @@
 // The plate's kernel is positive definite only among weights that neither sum up to anything nor have a first moment. Those are a
 // plane Q through 0; there Q' K Q = L L', and Q L^-T are weights of which the bending energy is a plain sum of squares.
 #include "ThinPlate.h"
-#include "Core/Base/Median.h"
+#include "Core/Base/Percentile.h"
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Cholesky>

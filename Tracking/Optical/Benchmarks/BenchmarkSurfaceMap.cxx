@@ -3,7 +3,6 @@
 // not quite those of any model: the error at places that no mark is at, beside the dissertation's map through a proxy and beside
 // OpenCV, which fits the pose and takes the lens as it is said to be. Where errors are: by the slant of the skin and the angle to
 // the axis. A lens that two domes calibrated, in a third shell. What a question takes, and its ray by Embree.
-#include "Core/Base/Median.h"
 #include "Core/Base/Percentile.h"
 #include "Filters/Acoustics/EmbreeQuery.h"
 #include "Filters/Shell/Benchmarks/InventedAbdomen.h"

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "Core/Base/Median.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Percentile.h"
 #include "Core/Base/SymmetricMatrix.h"

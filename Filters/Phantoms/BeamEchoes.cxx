@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "Core/Imaging/BeamEchoes.h"
+#include "Filters/Phantoms/BeamEchoes.h"
 #include <algorithm>
 
 namespace echorama {
