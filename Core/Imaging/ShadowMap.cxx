@@ -100,7 +100,7 @@ Cells CellsFor(const ImageGeometry& voxels, int resolution)
   }
   const auto& n = cells.geometry.dimensions;
   cells.mean = cells.least = cells.largest = Volume<float>(n, Unreal);
-  cells.count = Volume<int>(n);
+  cells.count = Volume<int>(n, 0);
   return cells;
 }
 
@@ -434,7 +434,7 @@ Volume<float> ShadowOfCells(const Cells& cells, const BeamGrid& grid, VolumeView
 template <class T>
 Volume<int> SaturatedVoxels(const PosedVolume<T>& volume, const Cells& cells, float top, const Progress& progress)
 {
-  Volume<int> saturated(cells.geometry.dimensions);
+  Volume<int> saturated(cells.geometry.dimensions, 0);
   const auto out = saturated.View();
   const auto largest = cells.largest.View();
   const Reality<T> isReal(volume);

@@ -74,7 +74,7 @@ void Check(const DiffusionParameters& parameters, const DiffusionSources& source
 
 Volume<unsigned char> MaskOf(const DiffusionSources& sources, const std::array<int, 3>& grid)
 {
-  Volume<unsigned char> mask(grid);
+  Volume<unsigned char> mask(grid, 0);
   for (const auto& voxel : sources.voxels) {
     for (std::size_t axis = 0; axis < 3; ++axis)
       if (voxel[axis] < 0 || voxel[axis] >= grid[axis])

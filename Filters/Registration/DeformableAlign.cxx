@@ -34,7 +34,7 @@ constexpr double FromAllBoxes = 0.3;
 using Vectors = LatticeEquations::Vectors;
 
 // A value and a weight of every voxel of a grid, side by side.
-using Seen = Zeroed<float>;
+using Seen = std::vector<float>;
 
 // The level whose voxels are of a size: the finest that is not finer.
 const MetricLevel& LevelOf(const MetricPyramid& pyramid, int octave)

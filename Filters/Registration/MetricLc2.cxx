@@ -16,7 +16,7 @@ void SeeLc2(const MetricSource& source, MetricLevel& level)
   SeeIntensity(source, level);
   const auto& n = level.geometry.dimensions;
   const std::ptrdiff_t strides[3] = {1, n[0], static_cast<std::ptrdiff_t>(n[0]) * n[1]};
-  level.edges = Zeroed<SeenVoxel>(level.seen.size());
+  level.edges.assign(level.seen.size(), {});
   const SeenVoxel* seen = level.seen.data();
   const double octaveMm = std::exp2(level.octave);
   ParallelFor(n[2], [&](std::ptrdiff_t k) {

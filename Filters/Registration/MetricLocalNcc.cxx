@@ -202,7 +202,7 @@ void SeeLocalNcc(const MetricSource& source, MetricLevel& level)
   const float mean = static_cast<float>(global.mean);
   const float floor = static_cast<float>(FloorShare * FloorShare * global.deviation * global.deviation) + 1e-30f;
   const Windows windows(source, mean, window);
-  level.seen = Zeroed<SeenVoxel>(static_cast<std::size_t>(source.intensity.Size()));
+  level.seen.resize(static_cast<std::size_t>(source.intensity.Size()));
   const std::ptrdiff_t slice = source.intensity.SliceStride();
   SmoothSlices(
       n, 2, smooth, source.spans,

@@ -35,7 +35,7 @@ void SeeMindSsc(const MetricSource& source, MetricLevel& level)
   }
   const Eigen::Vector3d sigma = (1.0 * octaveMm / level.geometry.spacing.array()).matrix();
 
-  level.descriptors = Zeroed<unsigned char>(static_cast<std::size_t>(ChannelStride * count));
+  level.descriptors.assign(static_cast<std::size_t>(ChannelStride * count), 0);
   Volume<float> distances(n), weights(n), mean(n), least(n, 1e30f), left(n, 1.0f);
   std::vector<Volume<float>> channels;
   for (std::size_t a = 0; a < 6; ++a)

@@ -11,7 +11,7 @@ void SeeIntensity(const MetricSource& source, MetricLevel& level)
 {
   const MeanAndDeviation global = MeanAndDeviationOf(source);
   const double scale = global.deviation > 0.0 ? 1.0 / global.deviation : 0.0;
-  level.seen = Zeroed<SeenVoxel>(static_cast<std::size_t>(source.intensity.Size()));
+  level.seen.assign(static_cast<std::size_t>(source.intensity.Size()), {});
   ParallelRanges(source.intensity.Size(), 1 << 16, {}, [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
     for (std::ptrdiff_t i = begin; i < end; ++i) {
       const float v = source.intensity[i];
