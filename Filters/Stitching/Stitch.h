@@ -39,8 +39,8 @@ struct StitchParameters {
   double reliabilityFloor = 0.01;
   bool allowDisjoint = false;
   double maximumMemoryGb = 0.0;
-  int planStep =
-      0; ///< voxels of the output between those of the grid that membranes are found on; 0: 2 where that is fine enough
+  /// Voxels of the output between those of the grid that membranes are found on; 0: 2 where that is fine enough.
+  int planStep = 0;
   /// Largest error of the weights of two volumes that comes from their membrane on its grid, certified for exponents from 1
   /// to 32.
   double membraneTolerance = 1.0 / 512;
