@@ -44,7 +44,8 @@ void ResampleMotion(Session& session, const MotionOptions& options)
   SequenceWriter writer(options.output, content, false, files);
   int gaps = 0;
   double length = 0.0, largest = 0.0;
-  std::optional<Pose> before;
+  Eigen::Vector3d before = Eigen::Vector3d::Zero();
+  bool hasBefore = false;
   for (int i = 0; i <= static_cast<int>(steps); ++i) {
     SequenceFrame frame;
     frame.time = std::min(first + i / options.rate, last);
@@ -53,17 +54,18 @@ void ResampleMotion(Session& session, const MotionOptions& options)
     if (path->Covers(frame.time)) {
       const Pose pose = path->At(frame.time);
       transform.matrix = pose;
-      if (before) {
-        const double step = (pose.translation() - before->translation()).norm();
+      if (hasBefore) {
+        const double step = (pose.translation() - before).norm();
         length += step;
         largest = std::max(largest, step * options.rate);
       }
-      before = pose;
+      before = pose.translation();
+      hasBefore = true;
     } else {
       transform.status = TransformStatus::Missing;
       transform.statusText = TransformStatusText(transform.status);
       ++gaps;
-      before.reset();
+      hasBefore = false;
     }
     frame.transforms = {transform};
     writer.Append(frame, nullptr);

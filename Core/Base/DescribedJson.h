@@ -134,7 +134,7 @@ public:
     const Json* found = FindList(key, presence);
     if (!found)
       return;
-    values.assign(found->size(), T());
+    values = std::vector<T>(found->size());
     for (std::size_t i = 0; i < found->size(); ++i) {
       T* value = &values[i];
       Take((*found)[i], At(key, i), range, presence, value);

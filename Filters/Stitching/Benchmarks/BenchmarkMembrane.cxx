@@ -155,7 +155,7 @@ struct Reference {
   std::vector<double> values; // of the scene's voxels
   double bound = 0.0;         // no value is further from the solution
 
-  Reference(const Scene& scene, const std::vector<float>& guess) : values(guess.begin(), guess.end())
+  Reference(const Scene& scene, const Zeroed<float>& guess) : values(guess.begin(), guess.end())
   {
     const RowSpans& spans = *scene.kinds.spans;
     const auto kind = [&](std::ptrdiff_t at) {
@@ -209,7 +209,7 @@ struct Reference {
       throw Error(Error::Kind::NotPossible, "the reference of a membrane did not converge");
   }
 
-  double LargestError(const Scene& scene, const std::vector<float>& other) const
+  double LargestError(const Scene& scene, const Zeroed<float>& other) const
   {
     double error = 0.0;
     for (std::size_t at = 0; at < values.size(); ++at)
@@ -477,7 +477,7 @@ void CompareSolvers(int size)
     return values.values;
   };
   MembraneReport report;
-  const std::vector<float> values = solve({}, report);
+  const Zeroed<float> values = solve({}, report);
   const Reference exact(scene, values);
   const auto tell = [&](const std::string& method, double time, double error, nlohmann::ordered_json more) {
     more.update({{"unknowns", scene.unknowns},
