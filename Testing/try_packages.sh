@@ -29,7 +29,7 @@ try() { # NAME COMMAND...
   fi
 }
 apt() { apt-get install -y -qq --no-install-recommends "$@"; }
-files() { find /etc /opt /usr /var -path /var/cache/apt -prune -o -path /var/lib/apt -prune -o -path /var/lib/dpkg -prune -o -path /var/log -prune -o -print | sort; }
+files() { find /etc /opt /usr /var -path /var/cache/apt -prune -o -path /var/cache/man -prune -o -path /var/lib/apt -prune -o -path /var/lib/dpkg -prune -o -path /var/log -prune -o -print | sort; }
 
 # What the packages ask for, and nothing of theirs: what is here afterwards and was not before is then ours.
 needs() {
@@ -51,10 +51,12 @@ pipeline() {
 python_package() {
   cat >python.py <<'END'
 import echorama
-source = echorama.vtkUltrasoundPhantomSource()
-source.SetSpacingMm(4)
 stitcher = echorama.vtkUltrasoundStitcher()
-stitcher.AddInputConnection(source.GetOutputPort())
+for x in (0, 20):
+    source = echorama.vtkUltrasoundPhantomSource()
+    source.SetSpacingMm(4)
+    source.SetPosition(x, 0, 0)
+    stitcher.AddInputConnection(source.GetOutputPort())
 stitcher.Update()
 grey = stitcher.GetOutput().GetPointData().GetScalars().GetRange()
 print(echorama.__file__, grey)
@@ -92,7 +94,7 @@ project() {
   cmake -S cpp -B cpp/build
   cmake --build cpp/build
   cpp/build/make_phantom | grep 'mean grey'
-  cpp/build/stitch_volumes demo/volume_*.mha | grep 'wrote stitched.vti'
+  cpp/build/stitch_volumes demo/volume_?.mha | grep 'wrote stitched.vti'
 }
 plugin() {
   cat >plugin.py <<END

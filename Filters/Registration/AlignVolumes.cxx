@@ -22,6 +22,7 @@
 #include <chrono>
 #include <set>
 #include <tuple>
+#include <utility>
 
 namespace echorama {
 namespace {
@@ -52,8 +53,9 @@ PreparedVolumes::Made AlignVolumesRun::Prepare(int v, const Progress& progress)
   return made;
 }
 
-// All that pairs will ask for is made as long as there is room for it, unless they may be known already.
-void AlignVolumesRun::Outline(int v, const Progress& progress)
+// All that pairs will ask for is made as long as there is room for it, unless they may be known already, or only a plan is
+// wanted.
+void AlignVolumesRun::Outline(int v, bool isPlan, const Progress& progress)
 {
   const VolumeOnDemand& source = sources_[Index(v)];
   PreparedVolume resolutions;
@@ -68,7 +70,7 @@ void AlignVolumesRun::Outline(int v, const Progress& progress)
   };
   try {
     const bool mayBeKnown = shared_.Ranks() == 1 ? !finished_.Empty() : !p_.resources.finishedPairs.empty();
-    if (!mayBeKnown && prepared_.HasRoom()) {
+    if (!isPlan && !mayBeKnown && prepared_.HasRoom()) {
       outlines_.emplace_back(prepared_.Get(v, progress)->placed);
       return;
     }
@@ -84,11 +86,11 @@ void AlignVolumesRun::Outline(int v, const Progress& progress)
   outlines_.emplace_back(placed);
 }
 
-void AlignVolumesRun::OutlineAll(const Progress& progress)
+void AlignVolumesRun::OutlineAll(bool isPlan, const Progress& progress)
 {
   const auto [first, last] = shared_.Share(Count());
   for (auto v = static_cast<int>(first); v < last; ++v)
-    Outline(v, progress.Part(static_cast<double>(v - first) / (last - first), (v - first + 1.0) / (last - first)));
+    Outline(v, isPlan, progress.Part(static_cast<double>(v - first) / (last - first), (v - first + 1.0) / (last - first)));
   if (shared_.Ranks() > 1)
     ShareOutlines();
   const auto trouble = std::find_if(troubles_.rbegin(), troubles_.rend(), [](const std::string& text) { return !text.empty(); });
@@ -387,7 +389,7 @@ AlignVolumesRun::FirstPairs AlignVolumesRun::ChooseFirst() const
 
 AlignVolumesResult AlignVolumesRun::Run(const Progress& progress)
 {
-  OutlineAll(progress.Part(0.0, 0.1));
+  OutlineAll(false, progress.Part(0.0, 0.1));
   const FirstPairs first = ChooseFirst();
   if (Count() == 2) {
     TryAll(first.sure, p_.pair.start, Start(), progress.Part(0.1, 1.0));
@@ -428,8 +430,9 @@ AlignVolumesResult AlignVolumesRun::Run(const Progress& progress)
 
 AlignVolumesPlan AlignVolumesRun::Plan(const Progress& progress)
 {
-  OutlineAll(progress.Part(0.0, 0.5));
+  OutlineAll(true, progress.Part(0.0, 0.5));
   AlignVolumesPlan plan;
+  plan.seconds = std::exchange(featureSeconds_, 0.0);
   const std::vector<Pose> starts = Start();
   std::vector<std::pair<Numbers, AlignStart>> left;
   const FirstPairs first = ChooseFirst();
@@ -461,7 +464,7 @@ AlignVolumesPlan AlignVolumesRun::Plan(const Progress& progress)
     plan.secondsPerPair = pairSeconds_ / static_cast<double>(samples);
     plan.secondsPerVolume = featureSeconds_ / std::max(prepared_.TimesMade(), 1);
   }
-  plan.seconds = plan.secondsPerPair * static_cast<double>(left.size()) + plan.secondsPerVolume * plan.timesPrepared;
+  plan.seconds += plan.secondsPerPair * static_cast<double>(left.size()) + plan.secondsPerVolume * plan.timesPrepared;
   return plan;
 }
 

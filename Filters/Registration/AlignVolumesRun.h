@@ -62,8 +62,8 @@ private:
   Numbers Ordered(int a, int b) const { return IsHeld(b) || (!IsHeld(a) && b < a) ? Numbers(b, a) : Numbers(a, b); }
 
   PreparedVolumes::Made Prepare(int v, const Progress& progress);
-  void Outline(int v, const Progress& progress);
-  void OutlineAll(const Progress& progress);
+  void Outline(int v, bool isPlan, const Progress& progress);
+  void OutlineAll(bool isPlan, const Progress& progress);
   void ShareOutlines();
   std::vector<Numbers> PairsAt(const std::vector<Pose>& poses, double reachMm) const;
   std::vector<Numbers> PairsWithLandmarks() const;

@@ -682,6 +682,7 @@ TEST(AlignVolumes, ThePlanIsWhatIsDone)
   p.resources.memoryGb = 1.0;
   const AlignVolumesPlan plan = PlanAlignment(demand.volumes, 0, p, {}, demand.Aligner());
   EXPECT_LE(ring.calls.size(), 3u);
+  EXPECT_LE(demand.made, 6); // the volumes of these pairs alone
   const AlignVolumesResult result = AlignVolumesOnDemand(demand.volumes, 0, p, {}, demand.Aligner());
   std::vector<Numbers> planned = plan.pairs, done;
   std::sort(planned.begin(), planned.end());
