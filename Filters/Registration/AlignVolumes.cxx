@@ -3,9 +3,8 @@
 // volume its coarsest resolution is kept: it tells who overlaps whom. Pairs are aligned one after the other; each uses all
 // threads itself. Then the pose graph votes.
 //
-// A wrong pair is not lost: once its volumes are placed by others it is aligned again from there, and then it is right and
-// adds to what is known. The same goes for pairs that failed from a bad start, and for those that nobody had thought to
-// overlap. That round is cheap, because the start is then as good as a tracker's.
+// A wrong pair is not lost: once others have placed its volumes it is aligned again from there. So are pairs that failed from a
+// bad start, and those that nobody had thought to overlap. That round is cheap: the start is then as good as a tracker's.
 //
 // Ranks share the coarsest resolutions, which are made of so many volumes by each, and the pairs of a round: each aligns a piece
 // of their order for reuse, so that it prepares few of the volumes, and every rank hears of all that was found. They all solve
