@@ -14,6 +14,7 @@ import subprocess
 import time
 
 import numpy
+from many_volumes import write_metaimage
 
 EDGE, COUNT, ROWS, SPACING = 128, 200, 10, 0.2
 
@@ -31,20 +32,11 @@ def make_volumes(folder, size):
         cosine, sine = numpy.cos(angle), numpy.sin(angle)
         along = numpy.array([column / (COUNT // ROWS - 1), row / (ROWS - 1), row / (ROWS - 1)])
         offset = (numpy.array(size) - EDGE) * along * SPACING
-        header = f"""ObjectType = Image
-NDims = 3
-BinaryData = True
-BinaryDataByteOrderMSB = False
-CompressedData = False
-TransformMatrix = {cosine} {sine} 0 {-sine} {cosine} 0 0 0 1
-Offset = {offset[0]} {offset[1]} {offset[2]}
-ElementSpacing = {SPACING} {SPACING} {SPACING}
-DimSize = {EDGE} {EDGE} {EDGE}
-ElementType = MET_UCHAR
-ElementDataFile = LOCAL
-"""
+        pose = numpy.eye(4)
+        pose[:2, :2] = [[cosine, -sine], [sine, cosine]]
+        pose[:3, 3] = offset
         files.append(folder / f"volume{number:03d}.mha")
-        files[-1].write_bytes(header.encode() + voxels.tobytes())
+        write_metaimage(files[-1], voxels, pose, SPACING)
     return files
 
 
