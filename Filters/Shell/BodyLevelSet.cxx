@@ -5,27 +5,9 @@
 #include "BodyLevelSet.h"
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/MeshToVolume.h>
+#include <vector>
 
 namespace echorama {
-namespace {
-
-// What OpenVDB asks of a mesh.
-struct MeshInCells {
-  const TriangleSurface& surface;
-  const Eigen::Vector3d& origin;
-  double cellMm;
-
-  std::size_t polygonCount() const { return surface.triangles.size(); }
-  std::size_t pointCount() const { return surface.points.size(); }
-  std::size_t vertexCount(std::size_t) const { return 3; }
-  void getIndexSpacePoint(std::size_t polygon, std::size_t corner, openvdb::Vec3d& place) const
-  {
-    const Eigen::Vector3d point = (surface.points[surface.triangles[polygon][corner]].cast<double>() - origin) / cellMm;
-    place = openvdb::Vec3d(point.x(), point.y(), point.z());
-  }
-};
-
-} // namespace
 
 struct BodyLevelSet::Grid {
   openvdb::FloatGrid::Ptr distances;
@@ -35,10 +17,22 @@ BodyLevelSet::BodyLevelSet(const BodySurface& body, const Eigen::Vector3d& origi
                            double outsideMm)
   : grid_(new Grid)
 {
-  const auto lattice = openvdb::math::Transform::createLinearTransform(cellMm);
-  grid_->distances = openvdb::tools::meshToVolume<openvdb::FloatGrid>(MeshInCells{body.Surface(), origin, cellMm}, *lattice,
-                                                                      static_cast<float>(outsideMm / cellMm),
-                                                                      static_cast<float>(insideMm / cellMm));
+  const TriangleSurface& surface = body.Surface();
+  std::vector<openvdb::Vec3s> points;
+  points.reserve(surface.points.size());
+  for (const auto& point : surface.points) {
+    const Eigen::Vector3f place = (point.cast<double>() - origin).cast<float>();
+    points.emplace_back(place.x(), place.y(), place.z());
+  }
+  std::vector<openvdb::Vec3I> triangles;
+  triangles.reserve(surface.triangles.size());
+  for (const auto& corners : surface.triangles)
+    triangles.emplace_back(corners[0], corners[1], corners[2]);
+  // This one conversion is compiled into OpenVDB's library; any other would take minutes to compile here.
+  openvdb::util::NullInterrupter interrupter;
+  grid_->distances = openvdb::tools::meshToSignedDistanceField<openvdb::FloatGrid>(
+      interrupter, *openvdb::math::Transform::createLinearTransform(cellMm), points, triangles, {},
+      static_cast<float>(outsideMm / cellMm), static_cast<float>(insideMm / cellMm));
 }
 
 BodyLevelSet::~BodyLevelSet() = default;
