@@ -125,8 +125,12 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
       throw Error(Error::Kind::FileSystem, options.output + ": it is there already; name it with -o to replace it");
   }
   CheckOutput(options.output, inputs);
-  if (const std::string finished = aligner->GetFinishedPairs(); !finished.empty())
+  if (const std::string finished = aligner->GetFinishedPairs(); !finished.empty()) {
     CheckOutput(finished, inputs);
+    if (std::filesystem::weakly_canonical(finished) == std::filesystem::weakly_canonical(options.output))
+      throw Error(Error::Kind::InvalidParameter,
+                  "--finished-pairs: " + finished + " is the file of poses, too; each needs its own");
+  }
   for (std::size_t i = 0; options.deformable && i < options.files.size(); ++i)
     CheckOutput(DisplacementPath(options.output, i), inputs);
   if (options.fixed > static_cast<int>(options.files.size()))

@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a metric sees of a volume is made once and serves all its pairs, as far as memory lasts (PreparedVolumes). Of every
-// volume its coarsest resolution is kept: it tells who overlaps whom. Pairs are aligned one after the other; each uses all
-// threads itself. Then the pose graph votes.
+// What a metric sees of a volume is computed once and serves all its pairs while memory lasts (PreparedVolumes). The coarsest
+// resolution of every volume is kept: it tells which volumes overlap. Pairs are aligned one after the other, each by all
+// threads; then the pose graph votes. Pairs that were voted down, failed from a bad start or were not expected to overlap are
+// aligned again from where others place their volumes, which is as good a start as a tracker's.
 //
-// A wrong pair is not lost: once others have placed its volumes it is aligned again from there. So are pairs that failed from a
-// bad start, and those that nobody had thought to overlap. That round is cheap: the start is then as good as a tracker's.
-//
-// Ranks share the coarsest resolutions, which are made of so many volumes by each, and the pairs of a round: each aligns a piece
-// of their order for reuse, so that it prepares few of the volumes, and every rank hears of all that was found. They all solve
-// the graph, as that takes less time than the pairs.
+// Ranks share the coarsest resolutions, of which each makes some, and the pairs of a round: each aligns a piece of their order
+// for reuse, so that it prepares few of the volumes. Every rank hears of all that was found and solves the graph itself.
 //
 // Cost: pairs times AlignPair. Which pairs overlap costs next to nothing (OverlappingPairs).
 #include "AlignVolumesRun.h"
@@ -52,8 +49,7 @@ PreparedVolumes::Made AlignVolumesRun::Prepare(int v, const Progress& progress)
   return made;
 }
 
-// All that pairs will ask for is made as long as there is room for it, unless they may be known already, or only a plan is
-// wanted.
+// All that pairs will ask for is made while there is room, unless they may be known already, or only a plan is wanted.
 void AlignVolumesRun::Outline(int v, bool isPlan, const Progress& progress)
 {
   const VolumeOnDemand& source = sources_[Index(v)];
@@ -301,37 +297,43 @@ PoseEdge AlignVolumesRun::AsSeenFromFixed(PoseEdge edge) const
   return edge;
 }
 
-// Volumes that are not placed are looked for in any rotation beside those that are.
+// Volumes that are not placed are looked for in any rotation beside those that are; again beside those that were found since.
 void AlignVolumesRun::FindTheLost(const Progress& progress)
 {
-  for (int v = 0; v < Count(); ++v) {
-    if (graph_.isPlaced[Index(v)] || !CanBeAligned(v))
-      continue;
-    std::vector<std::pair<double, int>> others; // by distance
-    for (int other = 0; other < Count(); ++other)
-      if (graph_.isPlaced[Index(other)] && CanBeAligned(other))
-        others.push_back({(graph_.volumeToWorld[Index(other)] * outlines_[Index(other)].shape.centroid -
-                           graph_.volumeToWorld[Index(v)] * outlines_[Index(v)].shape.centroid)
-                              .norm(),
-                          other});
-    std::sort(others.begin(), others.end());
-    const std::size_t most = std::min(others.size(), Index(FarTries)), atOnce = Index(shared_.Ranks());
-    bool isFound = false;
-    for (std::size_t i = 0; i < most && !isFound; i += atOnce) { // what comes after the first that is found does not count
-      std::vector<Numbers> pairs;
-      for (std::size_t next = i; next < std::min(i + atOnce, most); ++next)
-        pairs.push_back(Ordered(v, others[next].second));
-      const std::vector<PairAlignment> found = Answers(pairs, AlignStart::Unknown, graph_.volumeToWorld,
-                                                       progress.Part(static_cast<double>(v) / Count(), (v + 1.0) / Count()));
-      for (std::size_t pair = 0; pair < pairs.size() && !isFound; ++pair) {
-        Take(pairs[pair], graph_.volumeToWorld, found[pair]);
-        isFound = attempts_[pairs[pair]].pair.alignment.verdict == Verdict::Aligned;
+  const auto centre = [this](std::size_t v) { return Eigen::Vector3d(graph_.volumeToWorld[v] * outlines_[v].shape.centroid); };
+  std::set<Numbers> tried;
+  for (auto [turn, isNew] = std::pair(0, true); std::exchange(isNew, false); ++turn)
+    for (int v = 0; v < Count(); ++v) {
+      if (graph_.isPlaced[Index(v)] || !CanBeAligned(v))
+        continue;
+      std::vector<std::pair<double, Numbers>> others; // by distance
+      for (int other = 0; other < Count(); ++other)
+        if (graph_.isPlaced[Index(other)] && CanBeAligned(other))
+          others.push_back({(centre(Index(other)) - centre(Index(v))).norm(), Ordered(v, other)});
+      std::sort(others.begin(), others.end());
+      others.resize(std::min(others.size(), Index(FarTries)));
+      const Progress part = progress.Part(1.0 - std::exp2(-turn), 1.0 - std::exp2(-turn - 1)); // nobody knows how many turns
+      bool isFound = false, isPlacing = false;
+      // As many at once as there are ranks; what comes after the first that is found does not count.
+      for (std::size_t i = 0, end = 0; i < others.size() && !isFound; i = end) {
+        end = std::min(i + Index(shared_.Ranks()), others.size());
+        std::vector<Numbers> pairs;
+        for (std::size_t next = i; next < end; ++next)
+          if (tried.count(others[next].second) == 0)
+            pairs.push_back(others[next].second);
+        const std::vector<PairAlignment> found = Answers(pairs, AlignStart::Unknown, graph_.volumeToWorld,
+                                                         part.Part(static_cast<double>(v) / Count(), (v + 1.0) / Count()));
+        for (std::size_t pair = 0; pair < pairs.size() && !isFound; ++pair) {
+          tried.insert(pairs[pair]);
+          Take(pairs[pair], graph_.volumeToWorld, found[pair]);
+          isFound = found[pair].verdict == Verdict::Aligned;
+          isPlacing = isPlacing || found[pair].verdict != Verdict::Failed;
+        }
       }
+      if (isPlacing)
+        Solve({});
+      isNew = isNew || graph_.isPlaced[Index(v)];
     }
-    if (isFound)
-      Solve({});
-  }
-  progress(1.0);
 }
 
 // Pairs of placed volumes that overlap there, but were not tried, or do not stand though their volumes are sure to lie there.
@@ -390,10 +392,11 @@ AlignVolumesResult AlignVolumesRun::Run(const Progress& progress)
 {
   OutlineAll(false, progress.Part(0.0, 0.1));
   const FirstPairs first = ChooseFirst();
+  AlignVolumesResult result;
   if (Count() == 2) {
     TryAll(first.sure, p_.pair.start, Start(), progress.Part(0.1, 1.0));
     Solve({});
-    AlignVolumesResult result = Report();
+    result = Report();
     const PairOfVolumes& pair = result.pairs.front();
     VolumeAlignment& moving = result.volumes[Index(pair.moving)];
     moving.volumeToWorld = pair.alignment.volumeToWorld;
@@ -401,27 +404,24 @@ AlignVolumesResult AlignVolumesRun::Run(const Progress& progress)
     moving.reason = pair.alignment.reason;
     moving.information = pair.alignment.information;
     moving.centre = pair.alignment.centre;
-    StateErrors(result);
-    StateCost(result);
-    return result;
-  }
-
-  const double middle = first.sure.empty() ? 0.1 : 0.4;
-  TryAll(first.sure, p_.pair.start, Start(), progress.Part(0.1, middle));
-  TryAll(first.near, first.start, Start(), progress.Part(middle, 0.7));
-  Solve({});
-  if (p_.pair.start == AlignStart::Automatic)
-    FindTheLost(progress.Part(0.7, 0.8));
-  for (int round = 1; round < p_.rounds; ++round) {
-    const std::vector<Numbers> again = PairsToTryAgain();
-    if (again.empty())
-      break;
-    TryAll(again, AlignStart::Tracked, graph_.volumeToWorld,
-           progress.Part(0.8 + 0.2 * (round - 1) / p_.rounds, 0.8 + 0.2 * round / p_.rounds));
+  } else {
+    const double middle = first.sure.empty() ? 0.1 : 0.4;
+    TryAll(first.sure, p_.pair.start, Start(), progress.Part(0.1, middle));
+    TryAll(first.near, first.start, Start(), progress.Part(middle, 0.7));
     Solve({});
+    if (p_.pair.start == AlignStart::Automatic)
+      FindTheLost(progress.Part(0.7, 0.8));
+    for (int round = 1; round < p_.rounds; ++round) {
+      const std::vector<Numbers> again = PairsToTryAgain();
+      if (again.empty())
+        break;
+      TryAll(again, AlignStart::Tracked, graph_.volumeToWorld,
+             progress.Part(0.8 + 0.2 * (round - 1) / p_.rounds, 0.8 + 0.2 * round / p_.rounds));
+      Solve({});
+    }
+    progress(1.0);
+    result = Report();
   }
-  progress(1.0);
-  AlignVolumesResult result = Report();
   StateErrors(result);
   StateCost(result);
   return result;

@@ -264,6 +264,32 @@ TEST(AlignVolumes, TheLostAreSearchedForInAllRotations)
   EXPECT_EQ(result.volumes[3].volumeToWorld.matrix(), ring.starts[3].matrix());
 }
 
+TEST(AlignVolumes, ALostVolumeThatIsFoundInDoubtIsPlacedInDoubt)
+{
+  Ring ring(4);
+  ring.starts[3].translation() += Eigen::Vector3d(500.0, 0.0, 0.0);
+  ring.verdicts[{1, 3}] = Verdict::Failed;
+  ring.verdicts[{2, 3}] = Verdict::Ambiguous;
+  const AlignVolumesResult result = AlignVolumes(ring.Volumes(), 0, {}, {}, ring.Aligner());
+  EXPECT_EQ(result.volumes[3].verdict, Verdict::Ambiguous) << result.volumes[3].reason;
+  EXPECT_LT(ring.Error(result), 0.1);
+}
+
+// The third overlaps the fourth and the fifth alone, which are lost themselves until they are asked about.
+TEST(AlignVolumes, TheLostAreFoundInAnyOrder)
+{
+  Ring ring(6);
+  std::swap(ring.truth[3], ring.truth[5]);
+  std::swap(ring.starts[3], ring.starts[5]);
+  ring.starts[3].translation() += Eigen::Vector3d(-500.0, 0.0, 0.0);
+  ring.starts[4].translation() += Eigen::Vector3d(0.0, 500.0, 0.0);
+  ring.starts[5].translation() += Eigen::Vector3d(0.0, -500.0, 0.0);
+  const AlignVolumesResult result = AlignVolumes(ring.Volumes(), 0, {}, {}, ring.Aligner());
+  for (const std::size_t v : {3, 4, 5})
+    EXPECT_EQ(result.volumes[v].verdict, Verdict::Aligned) << v << ": " << result.volumes[v].reason;
+  EXPECT_LT(ring.Error(result), 0.1);
+}
+
 TEST(AlignVolumes, WhereNothingIsKnownAllPairsAreTried)
 {
   Ring ring(5);
