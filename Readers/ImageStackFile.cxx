@@ -164,9 +164,9 @@ void ImageStack::Collect()
       FailFile(path, "the content is none of PNG, JPEG and TIFF");
     slices_.push_back({path, kind});
     const auto [pattern, number] = SplitNumber(fs::path(path).filename().string());
+    const bool alone = number < 0 || (kind == PictureKind::Tiff && ReadTiffPages(path).pages.size() > 1);
     fs::path folder = fs::path(path).parent_path();
-    for (const auto& entry :
-         number < 0 ? fs::directory_iterator() : fs::directory_iterator(folder.empty() ? "." : folder, error)) {
+    for (const auto& entry : alone ? fs::directory_iterator() : fs::directory_iterator(folder.empty() ? "." : folder, error)) {
       const auto [otherPattern, otherNumber] = SplitNumber(entry.path().filename().string());
       if (otherPattern == pattern && otherNumber >= 0 && entry.path().filename() != fs::path(path).filename())
         if (const PictureKind otherKind = KindOfFile(entry.path()); otherKind != PictureKind::None)
@@ -176,6 +176,11 @@ void ImageStack::Collect()
   std::sort(slices_.begin(), slices_.end(), [](const Picture& a, const Picture& b) {
     return NaturallyBefore(fs::path(a.path).filename().string(), fs::path(b.path).filename().string());
   });
+  for (const Picture& slice : slices_)
+    if (slices_.size() > 1 && slice.kind == PictureKind::Tiff)
+      if (const std::size_t pages = ReadTiffPages(slice.path).pages.size(); pages > 1)
+        FailFile(slice.path,
+                 "it holds " + std::to_string(pages) + " pages among images that are one slice each; open it by itself");
   if (slices_.size() == 1 && slices_[0].kind == PictureKind::Tiff)
     CollectPages(slices_[0].path);
   else if (!fs::is_directory(path, error) && slices_.size() > 1)

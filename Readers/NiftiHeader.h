@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include "Core/Base/ByteOrder.h"
+#include "Readers/ByteOrder.h"
 #include "Readers/ImageHeader.h"
 #include <array>
 #include <cstdint>

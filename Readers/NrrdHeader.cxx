@@ -256,6 +256,11 @@ private:
     PlaceAxes(header_, static_cast<int>(axes.size()));
   }
 
+  void NoteUnknownUnit(const std::string& text)
+  {
+    header_.notes.push_back("the unit of length is not known (" + text + "): millimetres were assumed");
+  }
+
   void ParseSpace(const std::vector<Vector>& vectors, const std::vector<std::size_t>& axes)
   {
     ImageGeometry& g = header_.geometry;
@@ -268,7 +273,7 @@ private:
         lines_.Fail("the axes of its space have different units");
       unit = known.value_or(1.0);
       if (!known)
-        header_.notes.push_back("the unit of length is not known (" + *text + "): millimetres were assumed");
+        NoteUnknownUnit(*text);
     }
     for (std::size_t i = 0; i < axes.size(); ++i) {
       const Eigen::Vector3d step = toLps.cwiseProduct(*vectors[axes[i]]);
@@ -291,6 +296,18 @@ private:
   {
     ImageGeometry& g = header_.geometry;
     header_.notes.push_back("the file has no direction: its axes were taken as those of the world");
+    Eigen::Vector3d unit = Eigen::Vector3d::Ones();
+    if (const std::string* text = Find("units")) {
+      const std::vector<std::string> names = Quoted(*text);
+      bool known = true;
+      for (std::size_t i = 0; i < axes.size(); ++i) {
+        const auto mm = names.size() == all ? Millimetres(names[axes[i]]) : std::nullopt;
+        unit[static_cast<Eigen::Index>(i)] = mm.value_or(1.0);
+        known = known && mm;
+      }
+      if (!known)
+        NoteUnknownUnit(*text);
+    }
     const auto perAxis = [&](const char* field, const char* name, const auto& use) {
       const std::string* text = Find(field);
       if (!text)
@@ -302,11 +319,13 @@ private:
         use(static_cast<Eigen::Index>(i), words[axes[i]]);
       return true;
     };
-    if (!perAxis("spacings", "spacings",
-                 [&](Eigen::Index i, std::string_view word) { g.spacing[i] = lines_.Numbers<double>("spacings", word, 1)[0]; }))
+    if (!perAxis("spacings", "spacings", [&](Eigen::Index i, std::string_view word) {
+          g.spacing[i] = unit[i] * lines_.Numbers<double>("spacings", word, 1)[0];
+        }))
       header_.notes.push_back("the file has no spacing: 1 mm was assumed");
-    if (!perAxis("axismins", "axis mins",
-                 [&](Eigen::Index i, std::string_view word) { g.origin[i] = lines_.Numbers<double>("axis mins", word, 1)[0]; }))
+    if (!perAxis("axismins", "axis mins", [&](Eigen::Index i, std::string_view word) {
+          g.origin[i] = unit[i] * lines_.Numbers<double>("axis mins", word, 1)[0];
+        }))
       header_.notes.push_back("the file has no origin: 0 0 0 was assumed");
     else
       // The minimum is the edge of the first sample where samples are cells.

@@ -3,6 +3,7 @@
 
 #include "Core/Base/Error.h"
 #include "Readers/ImageHeader.h"
+#include "Readers/SequenceFile.h"
 #include "Readers/VolumeFile.h"
 #include <algorithm>
 #include <cerrno>
@@ -35,8 +36,11 @@ std::vector<fs::path> FilesOfInput(const std::string& input)
     for (const char* extension : {".hdr", ".img"}) // NIfTI in two files
       if (files[i].extension() == ".hdr" || files[i].extension() == ".img")
         files.push_back(fs::path(files[i]).replace_extension(extension));
+    const std::string file = files[i].string();
     try {
-      files.emplace_back(ReadImageHeader(files[i].string()).dataPath);
+      FrameAxis axis;
+      axis.field = [](auto...) {};
+      files.emplace_back(LooksLikeSequence(file) ? ReadSequenceHeader(file, axis).dataPath : ReadImageHeader(file).dataPath);
     } catch (const Error&) {
       // Not there, or without a header: then there are no detached voxels.
     }

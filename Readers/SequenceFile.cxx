@@ -10,10 +10,10 @@
 // than 256 of them. A jump then costs the decompression of one such stretch, 1/256 of the file at most, and the memory
 // stays the same. Interleaved frames cost a pass over the file each, so that as many as 64 MB hold are taken in one pass.
 #include "Readers/SequenceFile.h"
-#include "Core/Base/ByteOrder.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/FormatText.h"
 #include "Core/Base/Words.h"
+#include "Readers/ByteOrder.h"
 #include "Readers/Compression.h"
 #include "Readers/DataFile.h"
 #include "Readers/FrameOrientation.h"

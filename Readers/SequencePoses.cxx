@@ -11,6 +11,8 @@
 namespace echorama {
 namespace {
 
+constexpr double CosineOfADegree = 0.99985;
+
 // Names of frames begin with a capital, as FramesOf makes them.
 std::string FrameName(std::string name)
 {
@@ -75,6 +77,9 @@ ImageGeometry FrameGeometry(const Eigen::Affine3d& imageToWorld, const std::arra
   grid.direction.col(0) = (sum + difference).normalized();
   grid.direction.col(1) = (sum - difference).normalized();
   grid.direction.col(2) = grid.direction.col(0).cross(grid.direction.col(1));
+  if (dimensions[2] > 1 && !(grid.direction.col(2).dot(imageToWorld.linear().col(2)) > CosineOfADegree * grid.spacing[2]))
+    throw Error(Error::Kind::NotPossible, "frames of " + std::to_string(dimensions[2]) +
+                                              " slices cannot be placed by axes that are left-handed or not perpendicular");
   const Eigen::Vector3d middle((dimensions[0] - 1) / 2.0, (dimensions[1] - 1) / 2.0, (dimensions[2] - 1) / 2.0);
   grid.origin = imageToWorld * middle - grid.direction * grid.spacing.cwiseProduct(middle);
   return grid;

@@ -19,6 +19,8 @@ std::string ChooseWorldFrame(const TransformGraph& graph, const std::string& ima
 /// The grid nearest to pixels of \a dimensions under \a imageToWorld that is a rigid pose with a spacing: its x and y axes are
 /// turned by the same small angle to become perpendicular, about the middle of the frame. The third axis is perpendicular to
 /// both and only its spacing is that of the matrix. \a imageToWorld must not be singular.
+/// \throws Error(NotPossible) when there are several slices and the third axis of the matrix does not point, to a degree, where
+/// that of the grid does: they would be mirrored or sheared.
 ImageGeometry FrameGeometry(const Eigen::Affine3d& imageToWorld, const std::array<int, 3>& dimensions);
 
 /// Where the frames of a sequence lie, composed by name from the transforms of the file and fixed ones (a calibration).

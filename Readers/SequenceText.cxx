@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Readers/SequenceText.h"
-#include "Core/Base/ByteOrder.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
+#include "Readers/ByteOrder.h"
 #include <cmath>
 #include <set>
 

@@ -5,8 +5,8 @@
 // pixels: they are written twice, and the disk needs room for both copies. In memory there is never more than the 32 MB of
 // the compressor.
 #include "Readers/SequenceWriter.h"
-#include "Core/Base/ByteOrder.h"
 #include "Core/Base/Error.h"
+#include "Readers/ByteOrder.h"
 #include "Readers/Compression.h"
 #include "Readers/HeaderLines.h"
 #include "Readers/SequenceText.h"

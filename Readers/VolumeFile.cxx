@@ -2,9 +2,9 @@
 // Voxels go from the file straight into the caller's memory; swapping bytes and reversing slices happen in place. What a
 // header promises is compared with what the disk holds first: a lying header must not make us ask for terabytes.
 #include "Readers/VolumeFile.h"
-#include "Core/Base/ByteOrder.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/FormatText.h"
+#include "Readers/ByteOrder.h"
 #include "Readers/Compression.h"
 #include "Readers/DataFile.h"
 #include "Readers/HeaderLines.h"

@@ -3,8 +3,8 @@
 // free for it, which Finish() fills. So voxels follow their header as they come, and no more than the 32 MB of the compressor are
 // held.
 #include "Readers/VolumeWriter.h"
-#include "Core/Base/ByteOrder.h"
 #include "Core/Base/Error.h"
+#include "Readers/ByteOrder.h"
 #include "Readers/Compression.h"
 #include "Readers/HeaderLines.h"
 #include "Readers/NiftiHeader.h"

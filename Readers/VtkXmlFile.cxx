@@ -5,9 +5,9 @@
 //
 // Only the elements and those lengths are read here. What lies between them is skipped: it is most of the file.
 #include "Readers/VtkXmlFile.h"
-#include "Core/Base/ByteOrder.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Words.h"
+#include "Readers/ByteOrder.h"
 #include "Readers/HeaderLines.h"
 #include <algorithm>
 #include <array>

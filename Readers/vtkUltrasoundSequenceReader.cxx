@@ -133,6 +133,17 @@ struct vtkUltrasoundSequenceReader::Sequence {
     }
     return found.matrix;
   }
+
+  // The grid of a frame: where the image lies, else where the header puts it.
+  echorama::ImageGeometry GridOf(const std::optional<Eigen::Affine3d>& pose) const
+  {
+    const SequenceContent& content = File.Content();
+    try {
+      return pose ? echorama::FrameGeometry(*pose, content.dimensions) : content.geometry;
+    } catch (const Error& error) {
+      throw Error(error.GetKind(), content.path + ": " + Poses.Image() + "To" + Poses.World() + ": " + error.what());
+    }
+  }
 };
 
 //----------------------------------------------------------------------------
@@ -254,7 +265,7 @@ int vtkUltrasoundSequenceReader::RequestInformation(vtkInformation*, vtkInformat
     if (content.HasImages()) {
       sequence.Poses.MoveTo(sequence.File.Frame(0));
       const auto pose = sequence.Poses.ImageIsPlaced() ? sequence.PoseOf(sequence.Poses.Image()) : std::nullopt;
-      vtkUltrasoundVolume::SetGeometry(out, pose ? echorama::FrameGeometry(*pose, content.dimensions) : content.geometry);
+      vtkUltrasoundVolume::SetGeometry(out, sequence.GridOf(pose));
       vtkDataObject::SetPointDataActiveScalarInfo(out, echorama::VtkTypeOf(content.type), 1);
     } else {
       const int nothing[6] = {0, -1, 0, -1, 0, -1};
@@ -316,7 +327,7 @@ void vtkUltrasoundSequenceReader::ReadFrame(int index, vtkImageData* output, con
     vtkUltrasoundVolume::AddField(output, "WorldFrame", sequence.Poses.World());
   }
   if (content.HasImages()) {
-    vtkUltrasoundVolume::SetGeometry(output, pose ? echorama::FrameGeometry(*pose, content.dimensions) : content.geometry);
+    vtkUltrasoundVolume::SetGeometry(output, sequence.GridOf(pose));
     vtkDataArray* intensity = AddArray(output, vtkUltrasoundVolume::IntensityName(), echorama::VtkTypeOf(content.type));
     if (content.components == 1) {
       sequence.File.ReadFrame(index, intensity->GetVoidPointer(0), progress);

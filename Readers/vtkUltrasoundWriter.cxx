@@ -11,7 +11,6 @@
 #include "Readers/VolumeFile.h"
 #include "Readers/VolumeWriter.h"
 
-#include "vtkCallbackCommand.h"
 #include "vtkCellData.h"
 #include "vtkCommand.h"
 #include "vtkErrorCode.h"
@@ -29,6 +28,7 @@
 #include "vtkUltrasoundSequenceWriter.h"
 #include "vtkUltrasoundVolume.h"
 #include "vtkUltrasoundVoxelTypes.h"
+#include "vtkUnsignedCharArray.h"
 #include "vtkXMLImageDataWriter.h"
 
 #include <algorithm>
@@ -190,6 +190,31 @@ std::vector<echorama::HeaderField> FieldsOf(const Slab& slab, std::vector<std::s
   return held;
 }
 
+// Tells how far an algorithm is, and asks it to stop when that is wished.
+struct Telling {
+  vtkAlgorithm* Algorithm;
+  const echorama::Progress* Progress; // nullptr: not now
+  bool Stopped = false;
+
+  void Tell()
+  {
+    try {
+      if (Progress) {
+        (*Progress)(Algorithm->GetProgress());
+      }
+    } catch (const Error&) { // must not fly through VTK
+      Stopped = true;
+      Algorithm->SetAbortExecute(1);
+    }
+  }
+  void Check() const
+  {
+    if (Stopped) {
+      throw Error(Error::Kind::Cancelled, "stopped on request");
+    }
+  }
+};
+
 std::unique_ptr<VolumeWriter> OpenFile(const std::string& path, ImageHeader header, vtkDataArray* array, bool compress,
                                        FileReplacement& files)
 {
@@ -322,7 +347,7 @@ void vtkUltrasoundWriter::WriteData()
       break;
     }
     case FileFormat::VtkXmlImage:
-      this->WriteXml(input);
+      this->WriteXml(input, whole.Valid || LooksValidEverywhere(whole, 0, whole.Dimensions[2]), progress);
       break;
     default:
       throw Error(Error::Kind::InvalidParameter, path + UnknownExtension);
@@ -364,23 +389,8 @@ void vtkUltrasoundWriter::WriteBySlabs(const std::string& path, const echorama::
   information->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), whole.data());
 
   // The input tells how far it is with a slab, and stops when this is to stop.
-  const echorama::Progress* making = nullptr;
-  bool stopped = false;
-  const std::function<void()> onProgress = [&] {
-    try {
-      if (making) {
-        (*making)(source->GetProgress());
-      }
-    } catch (const Error&) {
-      stopped = true;
-      source->SetAbortExecute(1);
-    }
-  };
-  const vtkNew<vtkCallbackCommand> observer;
-  observer->SetClientData(const_cast<std::function<void()>*>(&onProgress));
-  observer->SetCallback(
-      [](vtkObject*, unsigned long, void* function, void*) { (*static_cast<const std::function<void()>*>(function))(); });
-  const unsigned long tag = source->AddObserver(vtkCommand::ProgressEvent, observer);
+  Telling telling{source, nullptr};
+  const unsigned long tag = source->AddObserver(vtkCommand::ProgressEvent, &telling, &Telling::Tell);
   const auto atTheEnd = [&](void*) {
     source->RemoveObserver(tag);
     // Whoever updates the input next without saying what of it wants the whole, as ever.
@@ -392,12 +402,10 @@ void vtkUltrasoundWriter::WriteBySlabs(const std::string& path, const echorama::
     const vtkNew<vtkInformationVector> requests;
     requests->SetNumberOfInformationObjects(source->GetNumberOfOutputPorts());
     requests->GetInformationObject(port)->Set(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT(), extent.data(), 6);
-    making = &slabProgress;
+    telling.Progress = &slabProgress;
     const bool made = source->Update(port, requests) != 0;
-    making = nullptr;
-    if (stopped) {
-      throw Error(Error::Kind::Cancelled, "stopped on request");
-    }
+    telling.Progress = nullptr;
+    telling.Check();
     vtkImageData* image = made ? vtkImageData::SafeDownCast(source->GetOutputDataObject(port)) : nullptr;
     if (!image || source->GetErrorCode() != vtkErrorCode::NoError) {
       throw Error(Error::Kind::BadInput,
@@ -497,7 +505,7 @@ void vtkUltrasoundWriter::NoteLost(const std::vector<std::string>& lost)
 }
 
 //----------------------------------------------------------------------------
-void vtkUltrasoundWriter::WriteXml(vtkImageData* input)
+void vtkUltrasoundWriter::WriteXml(vtkImageData* input, bool validIsSeen, const echorama::Progress& progress)
 {
   const std::string path = this->FileName;
   FileReplacement files;
@@ -505,6 +513,13 @@ void vtkUltrasoundWriter::WriteXml(vtkImageData* input)
   const vtkNew<vtkImageData> whole;
   whole->ShallowCopy(input);
   vtkUltrasoundVolume::SetGeometry(whole, vtkUltrasoundVolume::GeometryOf(input)); // extents from zero
+  if (!validIsSeen) { // else the reader would take zeros at the border for what was never scanned
+    const vtkNew<vtkUnsignedCharArray> valid;
+    valid->SetName(vtkUltrasoundVolume::ValidRegionName());
+    valid->SetNumberOfValues(whole->GetNumberOfPoints());
+    valid->FillValue(1);
+    whole->GetPointData()->AddArray(valid);
+  }
   const vtkNew<vtkXMLImageDataWriter> writer;
   writer->SetInputData(whole);
   writer->SetFileName(temporary.c_str());
@@ -514,10 +529,15 @@ void vtkUltrasoundWriter::WriteXml(vtkImageData* input)
   if (!this->UseCompression) {
     writer->SetCompressorTypeToNone();
   }
-  if (!writer->Write() || writer->GetErrorCode() != vtkErrorCode::NoError) {
+  Telling telling{writer, &progress};
+  writer->AddObserver(vtkCommand::ProgressEvent, &telling, &Telling::Tell);
+  const int written = writer->Write();
+  telling.Check(); // VTK's writer, asked to stop, goes on to its end and tells no more
+  if (!written || writer->GetErrorCode() != vtkErrorCode::NoError) {
     throw Error(Error::Kind::FileSystem, path + ": it cannot be written (" +
                                              vtkErrorCode::GetStringFromErrorCode(writer->GetErrorCode()) +
                                              "); what was there is left as it was");
   }
+  progress(1.0); // the last moment to stop
   files.Commit();
 }

@@ -109,7 +109,7 @@ private:
   void WriteBySlabs(const std::string& path, const echorama::Progress& progress);
   void WriteSlabs(const std::string& path, const std::array<int, 6>& whole, int slabs, const SlabSource& slabOf,
                   const echorama::Progress& progress);
-  void WriteXml(vtkImageData* input);
+  void WriteXml(vtkImageData* input, bool validIsSeen, const echorama::Progress& progress);
   void NoteLost(const std::vector<std::string>& lost);
   void Finish(int written);
 

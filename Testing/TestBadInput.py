@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Every kind of bad input, through the command line: exit status 1, one line that names the file (or parameter) and the
 reason, no crash, nothing written, nothing overwritten."""
+import json
 import os
 import pathlib
 import resource
@@ -363,6 +364,21 @@ class BadInput(unittest.TestCase):
         self.refuses("moved/", ["align", noise, twin, "-o", self.path / "p.json", "--apply", self.path / "moved"],
                      preexec_fn=small_disk)
         self.refuses("volumes/volume_1", ["phantom", "-o", self.path / "volumes", "--spacing", 4, "--count", 2], preexec_fn=small_disk)
+
+    def test_a_full_disk_of_a_scene(self):
+        """Files that VTK writes: surfaces, displacements."""
+        scene, whole = self.path / "scene.json", self.path / "whole"
+        scene.write_text(json.dumps({
+            "schema": "echorama-scene-1", "name": "block", "seed": 3, "background": "gel", "press": {"spacingMm": 4},
+            "volume": {"spacingMm": 6, "knockMm": 8, "knockDegrees": 6},
+            "tissue": [{"name": "block", "box": {"centre": [0, 0, 30], "size": [90, 90, 60], "material": "muscle"}}],
+            "views": {"poses": [{"face": [0, 0, 4], "target": [0, 0, 50]}]},
+            "probe": {"preset": "mechanical-3d", "depthMinMm": 2, "depthMaxMm": 60, "elements": 20, "sweepSteps": 12, "samples": 120}}))
+        run_json("synthesize", scene, "-o", whole)
+        for name in ("geometry.vtp", "displacement_1.vti"):
+            most = (whole / name).stat().st_size * 9 // 10
+            self.refuses("parts/" + name, ["synthesize", scene, "-o", self.path / "parts"], ["it cannot be written"],
+                         preexec_fn=lambda size=most: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)))
 
     def test_a_full_device(self):
         if not pathlib.Path("/dev/full").exists():

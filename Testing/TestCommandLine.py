@@ -391,6 +391,12 @@ class MainJob(unittest.TestCase):
             run_json("stitch", *files, "-o", work / f"{name}.mha", "--poses", work / f"{name}.json", "--spacing", 3)
             stitched.append(read_mha(work / f"{name}.mha")[1].astype(int))
         self.assertTrue((stitched[0] != stitched[1]).any())
+        good = (work / "bent.displacement-2.vti").read_text()
+        for bad in (good.replace('type="Float64"', 'type="Float99"'), good.replace("</VTKFile>", "")):
+            (work / "bent.displacement-2.vti").write_text(bad)
+            damaged = run("stitch", *files, "-o", work / "damaged.mha", "--poses", poses, "--spacing", 3)
+            self.assertEqual(damaged.returncode, 1)
+            self.assertIn("bent.displacement-2.vti: ", damaged.stderr)
         (work / "bent.displacement-2.vti").unlink()
         missing = run("stitch", *files, "-o", work / "missing.mha", "--poses", poses, "--spacing", 3)
         self.assertEqual(missing.returncode, 1)

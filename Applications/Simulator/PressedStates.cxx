@@ -5,6 +5,7 @@
 #include "AlgorithmRun.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/FormatText.h"
+#include "Readers/VtkXmlFile.h"
 #include "Scan.h"
 #include <algorithm>
 #include <cmath>
@@ -78,6 +79,11 @@ QStringList PressedStatesAmong(const QStringList& files)
   for (const QString& file : files) {
     if (!file.endsWith(".vti", Qt::CaseInsensitive) || !QFileInfo(file).isReadable())
       continue;
+    try {
+      CheckVtkXmlFile(file.toStdString());
+    } catch (const Error&) {
+      continue; // whoever reads it as a volume will say what is wrong
+    }
     vtkNew<vtkXMLImageDataReader> reader;
     reader->SetFileName(file.toUtf8());
     reader->UpdateInformation();
@@ -96,10 +102,18 @@ std::vector<vtkSmartPointer<vtkImageData>> ReadPressedStates(const QStringList& 
                 files.join(", ").toStdString() + ": these are states of a body that is pressed: open that first, or with them");
   std::vector<std::pair<vtkSmartPointer<vtkImageData>, std::string>> read;
   for (int i = 0; i < files.size(); i++) {
+    const std::string file = files[i].toStdString();
+    CheckVtkXmlFile(file);
     vtkNew<vtkXMLImageDataReader> reader;
-    reader->SetFileName(files[i].toUtf8());
-    Update(reader, progress.Part(static_cast<double>(i) / files.size(), (i + 1.0) / files.size()));
-    read.emplace_back(reader->GetOutput(), files[i].toStdString());
+    reader->SetFileName(file.c_str());
+    try {
+      Update(reader, progress.Part(static_cast<double>(i) / files.size(), (i + 1.0) / files.size()));
+    } catch (const Error& error) {
+      if (error.GetKind() == Error::Kind::Cancelled)
+        throw;
+      throw Error(error.GetKind(), file + ": " + error.what());
+    }
+    read.emplace_back(reader->GetOutput(), file);
     CheckState(read.back().second, read.back().first, body);
   }
   std::stable_sort(read.begin(), read.end(),

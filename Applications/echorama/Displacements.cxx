@@ -2,8 +2,10 @@
 // Displacements are files of their own beside the poses: images that ParaView and other programs of VTK read as they are.
 #include "Displacements.h"
 #include "Core/Base/Error.h"
+#include "Readers/VtkXmlFile.h"
 #include <algorithm>
 #include <filesystem>
+#include <vtkErrorCode.h>
 #include <vtkInformation.h>
 #include <vtkNew.h>
 #include <vtkUltrasoundDeformableAligner.h>
@@ -19,9 +21,16 @@ vtkSmartPointer<vtkImageData> ReadDisplacement(Session& session, const std::stri
 {
   if (!std::filesystem::exists(path))
     throw Error(Error::Kind::FileSystem, path + ": a displacement that the poses name is not there");
+  CheckVtkXmlFile(path);
   const vtkNew<vtkXMLImageDataReader> reader;
   reader->SetFileName(path.c_str());
-  session.Update(reader, "read", path);
+  try {
+    session.Update(reader, "read", path);
+  } catch (const Error& error) {
+    if (error.GetKind() == Error::Kind::Cancelled)
+      throw;
+    throw Error(error.GetKind(), path + ": " + error.what());
+  }
   vtkUltrasoundDisplacement::FieldOf(reader->GetOutput(), path); // or be told what is wrong with it
   return reader->GetOutput();
 }
@@ -41,7 +50,7 @@ void WriteDisplacement(vtkImageData* image, const std::string& path)
   writer->SetInputData(image);
   writer->SetFileName(path.c_str());
   writer->SetDataModeToBinary();
-  if (!writer->Write())
+  if (!writer->Write() || writer->GetErrorCode() != vtkErrorCode::NoError)
     throw Error(Error::Kind::FileSystem, path + ": it cannot be written");
 }
 

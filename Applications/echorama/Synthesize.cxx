@@ -9,6 +9,7 @@
 #include <CLI/Validators.hpp>
 #include <memory>
 #include <vtkCompositeDataSet.h>
+#include <vtkErrorCode.h>
 #include <vtkImageData.h>
 #include <vtkInformation.h>
 #include <vtkMultiBlockDataSet.h>
@@ -36,7 +37,7 @@ void WriteSurface(Session& session, vtkPolyData* surface, const std::string& pat
   writer->SetDataModeToAppended();
   writer->EncodeAppendedDataOff();
   session.Watch(writer, "write", path, [&] {
-    if (!writer->Write())
+    if (!writer->Write() || writer->GetErrorCode() != vtkErrorCode::NoError)
       throw Error(Error::Kind::FileSystem, path + ": it cannot be written (is the disk full?)");
   });
 }

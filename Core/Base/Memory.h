@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include <string>
 
 namespace echorama {
 
-/// Bytes of memory that this machine can give without swapping; where it does not tell, all that it has.
-double FreeMemory();
+/// Bytes of memory that this process can have without swapping: what the machine has left, or less where a control group (a
+/// container, a job of a cluster) limits it. Where neither tells, all that the machine has.
+/// \param root where /proc and /sys lie
+double FreeMemory(const std::string& root = "/");
 
 } // namespace echorama

@@ -171,6 +171,18 @@ TEST_F(ImageHeaderTest, NrrdUnitsSpacingsAndCells)
   Fields cells = plain;
   cells["centers"] = "cell cell cell";
   EXPECT_EQ(Read("c.nrrd", Nrrd(cells)).geometry.origin, Eigen::Vector3d(10.125, 20.25, -29.5));
+
+  cells["units"] = "\"cm\" \"mm\" \"m\"";
+  const ImageHeader each = Read("u.nrrd", Nrrd(cells));
+  EXPECT_EQ(each.geometry.spacing, Eigen::Vector3d(2.5, 0.5, 2000));
+  EXPECT_EQ(each.geometry.origin, Eigen::Vector3d(101.25, 20.25, -29500));
+  EXPECT_EQ(each.notes.size(), 1u) << "no direction";
+  for (const char* units : {"\"mm\" \"parsec\" \"mm\"", "\"cm\""}) {
+    cells["units"] = units;
+    const ImageHeader unknown = Read("u.nrrd", Nrrd(cells));
+    EXPECT_EQ(unknown.geometry.spacing, nodes.geometry.spacing);
+    EXPECT_EQ(unknown.notes.size(), 2u) << units;
+  }
 }
 
 TEST_F(ImageHeaderTest, LeftHandedAxesAreTakenInReverse)

@@ -326,6 +326,20 @@ TEST_F(ImageStackFile, PagesOfATiffAndWhatImageJWrote)
   EXPECT_EQ(OpenImageStack(WriteTiff("a.tif", pages, t))->Content().geometry.spacing, Eigen::Vector3d(1, 1, 1));
 }
 
+TEST_F(ImageStackFile, ATiffOfSeveralPagesIsAStackByItself)
+{
+  const auto page = Pattern<unsigned char>(5, 4);
+  const std::string three = WriteTiff<unsigned char>("scan_1.tif", {page, page, page}, {}),
+                    two = WriteTiff<unsigned char>("scan_2.tif", {page, page}, {});
+  EXPECT_EQ(OpenImageStack(three)->Content().geometry.dimensions[2], 3);
+  EXPECT_EQ(OpenImageStack(two)->Content().geometry.dimensions[2], 2);
+  Refused(folder.string(), "3 pages", three);
+  Refused(WriteTiff<unsigned char>("scan_0.tif", {page}, {}), "3 pages", three);
+  WriteTiff<unsigned char>("scan_1.tif", {page}, {});
+  WriteTiff<unsigned char>("scan_2.tif", {page}, {});
+  EXPECT_EQ(OpenImageStack(three)->Content().geometry.dimensions[2], 3);
+}
+
 TEST_F(ImageStackFile, BadImagesAreNamed)
 {
   const auto good = [this](const std::string& name) { return Png(name, Pattern<unsigned char>(40, 30), 40, 30); };

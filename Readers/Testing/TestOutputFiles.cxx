@@ -65,6 +65,19 @@ TEST_F(OutputFiles, InputsAndWhatBelongsToThemAreNeverOverwritten)
   EXPECT_TRUE(Says(Refusal([&] { CheckVolumeOutput(Path("b.txt"), {}); }), "names none of the formats"));
 }
 
+TEST_F(OutputFiles, DetachedPixelsOfVolumesAndSequencesAreInputs)
+{
+  const std::string pixels = Put("rec.igs.zraw", "x");
+  const std::string kinds[] = {"", "Kinds = domain domain list\nSeq_Frame0000_Timestamp = 1\n"};
+  for (const std::string& fields : kinds) {
+    const std::string header =
+        Put("fixed.igs.mhd", "ObjectType = Image\nNDims = 3\nDimSize = 2 3 4\nElementType = MET_UCHAR\nElementSpacing = 1 1 1\n" +
+                                 fields + "ElementDataFile = rec.igs.zraw\n");
+    EXPECT_TRUE(Says(Refusal([&] { CheckOutput(Path("rec.igs.mhd"), {header}); }), "rec.igs.zraw")) << fields;
+    EXPECT_EQ(FilesOfVolume(header), (std::vector<std::string>{header, pixels})) << fields;
+  }
+}
+
 TEST_F(OutputFiles, AFolderOfFilesAppearsWholeOrNotAtAll)
 {
   const std::string place = Path("new/set");

@@ -129,3 +129,23 @@ TEST(SequencePosesTest, TheGridOfAFrameIsTheNearestWithoutShear)
     EXPECT_NEAR(std::acos(nearest.direction.col(axis).dot(sheared.linear().col(axis).normalized())), angle / 2.0, 1e-9);
   }
 }
+
+TEST(SequencePosesTest, FramesOfSeveralSlicesAreNeitherMirroredNorSheared)
+{
+  Eigen::Affine3d pose = Moved(4.0, 30.0);
+  pose.linear() *= 0.5;
+  const Eigen::Vector3d last(9, 7, 4);
+  const ImageGeometry grid = FrameGeometry(pose, {10, 8, 5});
+  for (Eigen::Index i = 0; i < 3; ++i)
+    EXPECT_NEAR((grid.IndexToWorld() * last)[i], (pose * last)[i], 1e-10);
+  const auto refused = [](const Eigen::Affine3d& matrix) {
+    EXPECT_NO_THROW(FrameGeometry(matrix, {10, 8, 1}));
+    ExpectRefused([&] { FrameGeometry(matrix, {10, 8, 5}); }, Error::Kind::NotPossible, "5 slices", "left-handed");
+  };
+  Eigen::Affine3d wrong = pose;
+  wrong.linear().col(2) *= -1.0;
+  refused(wrong);
+  wrong = pose;
+  wrong.linear().col(2) += 0.1 * wrong.linear().col(0);
+  refused(wrong);
+}

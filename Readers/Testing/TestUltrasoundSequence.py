@@ -315,6 +315,11 @@ class Sequences(unittest.TestCase):
         reader.Update()
         self.assertIn("missing.xml", self.errors[0])
         refused(self.put("b.mha", sequence([{"ImageToATransform": text(matrix()), "ImageToBTransform": text(matrix())}])), "A, B")
+        mirrored = matrix()
+        mirrored[2, 2] = -1.0
+        volumes = sequence([{"ImageToReferenceTransform": text(mirrored)}] * 2).replace(b"NDims = 3", b"NDims = 4")
+        volumes = volumes.replace(b"DimSize = 6 4 2", b"DimSize = 6 2 2 2").replace(b"Kinds = domain", b"Kinds = domain domain")
+        refused(self.put("b.mha", volumes.replace(b"Spacing = 1", b"Spacing = 1 1")), "ImageToReference: frames of 2 slices")
         # A file that changes under the reader is opened again.
         reader = self.open(self.put("c.mha", sequence(tracked())))
         self.put("c.mha", sequence(tracked(4)))

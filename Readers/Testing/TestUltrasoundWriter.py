@@ -194,11 +194,13 @@ class Writer(unittest.TestCase):
                 array(image, "Intensity", intensity)
                 if mask is not None:
                     array(image, "ValidRegion", mask)
-                self.write("a.mha", image)
-                back, _ = self.read("a.mha")
                 wanted = ones if mask is None else mask
-                self.assertTrue((self.values(back, "ValidRegion") == wanted).all())
-        self.assertEqual(self.files(), ["a.mha"], "all ones over all ones needs no second file")
+                for name in ["a.mha", "a.vti"]:
+                    self.write(name, image)
+                    back, _ = self.read(name)
+                    self.assertTrue((self.values(back, "ValidRegion") == wanted).all(), name)
+                self.assertEqual(image.GetPointData().GetNumberOfArrays(), 1 if mask is None else 2)
+        self.assertEqual(self.files(), ["a.mha", "a.vti"], "all ones over all ones needs no second file")
 
     def test_openvdb_holds_the_valid_region_itself(self):
         image = volume()
@@ -314,6 +316,17 @@ class Writer(unittest.TestCase):
         self.assertEqual(writer.Write(), 0)
         back, _ = self.read("a.mha")
         self.assertEqual(back.GetNumberOfPoints(), 60)
+
+    def test_a_vti_that_is_stopped_leaves_what_was_there(self):
+        for when in [0.5, 1.0]:
+            self.write("a.vti", volume())
+            writer = self.writer("a.vti", volume(np.uint8, (50, 40, 30)))
+            writer.AddObserver("ProgressEvent", lambda sender, _, when=when: sender.SetAbortExecute(sender.GetProgress() >= when))
+            self.assertEqual(writer.Write(), 0)
+            self.assertEqual(self.messages, [])
+            self.assertEqual(self.files(), ["a.vti"])
+            back, _ = self.read("a.vti")
+            self.assertEqual(back.GetNumberOfPoints(), 60)
 
     def slabs(self, name, source, count, compress=True):
         writer = self.writer(name, None, compress)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "Core/Base/ByteOrder.h"
+#include "Readers/ByteOrder.h"
 #include <algorithm>
 
 namespace echorama {
