@@ -188,7 +188,7 @@ void vtkUltrasoundTrackerSource::Open(std::shared_ptr<echorama::PoseSubscription
     auto device = echorama::MakeTracker(this->Device);
     auto* recording = this->FollowTime ? dynamic_cast<echorama::ReplayTracker*>(device.get()) : nullptr;
     if (recording) {
-      limits.posesPerTool = 1000000; // whatever it holds; memory is taken as it is needed
+      limits.posesPerTool = std::numeric_limits<std::size_t>::max(); // whatever it holds; memory is taken as it is needed
     }
     auto session = std::make_unique<Session>(limits);
     session->Device = std::move(device); // from here on: should anything throw, it goes before what it writes to
@@ -217,6 +217,18 @@ void vtkUltrasoundTrackerSource::Open(std::shared_ptr<echorama::PoseSubscription
 //----------------------------------------------------------------------------
 void vtkUltrasoundTrackerSource::Close()
 {
+  if (echorama::StreamRecorder* recorder = this->Opened ? this->Opened->Recorder.get() : nullptr) {
+    this->Opened->Device.reset(); // what it has sent is recorded
+    std::string problem = "the recording ended with its device";
+    try {
+      recorder->StopIfAnything();
+    } catch (const Error& error) {
+      problem += std::string(": ") + error.what();
+      vtkErrorMacro(<< problem);
+    }
+    this->Ended = recorder->State();
+    this->Ended.problem = problem;
+  }
   this->Opened.reset();
   this->Failure.clear();
 }
@@ -325,6 +337,7 @@ bool vtkUltrasoundTrackerSource::StartRecording(const char* fileName)
     this->Open(&poses);
     auto next = std::make_unique<echorama::StreamRecorder>(path, poses ? poses : this->Opened->Poses.Subscribe());
     earlier = std::exchange(this->Opened->Recorder, std::move(next));
+    this->Ended = {};
   };
   if (!vtkUltrasoundVolume::Run(this, nullptr, start)) {
     return false;
@@ -350,7 +363,7 @@ bool vtkUltrasoundTrackerSource::StopRecording()
 //----------------------------------------------------------------------------
 echorama::RecordingState vtkUltrasoundTrackerSource::Recording() const
 {
-  return this->Opened && this->Opened->Recorder ? this->Opened->Recorder->State() : echorama::RecordingState();
+  return this->Opened && this->Opened->Recorder ? this->Opened->Recorder->State() : this->Ended;
 }
 
 //----------------------------------------------------------------------------

@@ -172,8 +172,9 @@ public:
   /**
    * Records every pose from now on to a sequence (.igs.mha) that a crash leaves whole up to the last half second; opens the
    * device if it is not open. A file that is there already is refused. No name, or an empty one, ends the recording, as
-   * StopRecording() does. Ends with the device when another one is set, and with the next StartRecording(): the new one begins
-   * first, so that nothing is lost between the two, and what is wrong with the earlier one is an error, but does not stop it.
+   * StopRecording() does. Ends when another device is set or this one is opened anew, which GetRecordingProblem() says, and with
+   * the next StartRecording(): the new one begins first, so that nothing is lost between the two, and what is wrong with the
+   * earlier one is an error, but does not stop it.
    * Returns false, with an error that names the reason, when it cannot be; StopRecording also when nothing was recorded. See
    * echorama::StreamRecorder.
    */
@@ -182,7 +183,9 @@ public:
   ///@}
 
   ///@{
-  /** Of the present recording: poses written, poses that came faster than that and were lost, and what is wrong; empty: nothing.
+  /**
+   * Of the present recording, or of one that ended with its device: poses written, poses that came faster than that and were
+   * lost, and what is wrong; empty: nothing.
    */
   vtkIdType GetNumberOfRecordedPoses() const { return static_cast<vtkIdType>(this->Recording().poses); }
   vtkIdType GetNumberOfUnrecordedPoses() const { return static_cast<vtkIdType>(this->Recording().lost); }
@@ -307,7 +310,8 @@ private:
   echorama::StreamLimits Limits;
   double FreshSeconds = echorama::LiveTransforms::defaultFreshSeconds, AxisLengthMm = 50.0;
   std::unique_ptr<Session> Opened;
-  std::string Failure; // why it could not be opened
+  echorama::RecordingState Ended; // the recording that its device ended
+  std::string Failure;            // why it could not be opened
   vtkSmartPointer<vtkPolyData> Skin;
   echorama::FusedTracker::NormalOf Normals;
 #endif

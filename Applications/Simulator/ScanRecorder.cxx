@@ -6,6 +6,7 @@
 #include "Readers/SequenceText.h"
 #include "Readers/SequenceWriter.h"
 #include "Scan.h"
+#include "Widgets/Session/ProjectFile.h"
 #include <algorithm>
 #include <QDateTime>
 #include <vtkDataArray.h>
@@ -83,6 +84,7 @@ QString ScanRecorder::Join(const QString& path, const Progress& progress)
     writer.Finish();
     files.Commit();
   }
+  BringToDisk({joined.toStdString()}); // before what it was made of goes
   QFile::remove(path);
   QFile::remove(path.left(path.size() - 3) + "raw");
   return joined;

@@ -356,6 +356,12 @@ void SimulatorWindow::Open(const QStringList& files, const QString& skin, const 
           subject->pressed = ReadPressedStates(states, *subject, progress.Part(*isBody ? 0.8 : 0.0, 1.0));
       },
       [this, subject, isBody, up] {
+        if (!*isBody && (scan_->Body().volumes != subject->volumes || scan_->Body().tissue != subject->tissue)) {
+          messages_->Show({Message::Warning,
+                           tr("Another body was opened while pressed states were read; open them again if they are of it"),
+                           {}});
+          return;
+        }
         const QString pressed = subject->pressed.empty()
                                     ? QString()
                                     : tr("The body gives way to a probe that is pressed in (Page Down), by up to %1 mm")

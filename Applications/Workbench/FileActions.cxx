@@ -124,30 +124,31 @@ void FileActions::OpenVolumes(const QStringList& files, const std::function<void
                                             : tr("Reading %1 volumes").arg(volumes.size());
   const auto read = std::make_shared<std::vector<ReadVolume>>();
   bench_->Forget("volumes");
+  const auto add = [this, read, then] {
+    auto* session = bench_->Session();
+    const bool wasEmpty = session->GetNumberOfVolumes() == 0, wasUntouched = !HasUnsavedWork();
+    int last = 0;
+    for (ReadVolume& volume : *read)
+      if (volume.image) {
+        const Messages::OfThread messages;
+        if (const int id = session->AddVolume(volume.image, volume.file.toUtf8().constData()); id > 0)
+          last = id;
+        else
+          volume = {volume.file, nullptr, QString::fromUtf8(messages.Error().c_str())};
+      }
+    WarnOfUnread(*read);
+    if (wasUntouched)
+      opened_ = session->GetKernel().State();
+    // The first volume stays where it is, as a rule: what comes later is to be moved.
+    if (last > 0 && !(wasEmpty && read->size() == 1))
+      session->Select(last, true, true);
+    ShowHistory();
+    if (then)
+      then();
+  };
   bench_->Shared().Run(
       this, label, [volumes, read](const Progress& progress) { *read = ReadVolumes(volumes, progress); },
-      [this, read, then] {
-        auto* session = bench_->Session();
-        const bool wasEmpty = session->GetNumberOfVolumes() == 0, wasUntouched = !HasUnsavedWork();
-        int last = 0;
-        for (ReadVolume& volume : *read)
-          if (volume.image) {
-            const Messages::OfThread messages;
-            if (const int id = session->AddVolume(volume.image, volume.file.toUtf8().constData()); id > 0)
-              last = id;
-            else
-              volume = {volume.file, nullptr, QString::fromUtf8(messages.Error().c_str())};
-          }
-        WarnOfUnread(*read);
-        if (wasUntouched)
-          opened_ = session->GetKernel().State();
-        // The first volume stays where it is, as a rule: what comes later is to be moved.
-        if (last > 0 && !(wasEmpty && read->size() == 1))
-          session->Select(last, true, true);
-        ShowHistory();
-        if (then)
-          then();
-      });
+      [this, add] { bench_->Shared().BetweenEdits(this, add); });
 }
 
 // All in one message, so that none pushes another away.
@@ -316,13 +317,16 @@ bool FileActions::SaveTo(const QString& path, bool withoutUnsavedResults)
 void FileActions::AskForResults(const QString& path, const QVector<int>& unsaved)
 {
   const int id = unsaved.first();
+  // What comes after belongs to this question: when it stays without an answer, a later save does not do it.
+  const auto save = [this, path, then = std::exchange(afterSave_, nullptr)](bool withoutUnsavedResults) {
+    afterSave_ = then;
+    SaveTo(path, withoutUnsavedResults);
+  };
   const QString file = FreeFileFor(bench_->Session(), id, QFileInfo(path).absolutePath());
-  const auto saveThere = [this, path, id, file] { SaveResult(bench_->Shared(), this, id, file, [this, path] { SaveTo(path); }); };
+  const auto saveThere = [this, id, file, save] { SaveResult(bench_->Shared(), this, id, file, [save] { save(false); }); };
   bench_->Ask(tr("%1 is in no file yet, and a project holds files. Save it beside the project, as %2?")
                   .arg(bench_->NameOf(id), QFileInfo(file).fileName()),
-              {{tr("Save it there"), saveThere},
-               {tr("Leave it out"), [this, path] { SaveTo(path, true); }},
-               {tr("Cancel"), [this] { afterSave_ = nullptr; }}});
+              {{tr("Save it there"), saveThere}, {tr("Leave it out"), [save] { save(true); }}, {tr("Cancel"), {}}}, "save");
 }
 
 bool FileActions::HasUnsavedWork() const

@@ -2,6 +2,7 @@
 #include "JobPanel.h"
 #include "JobBar.h"
 #include "Workspace.h"
+#include <QTimer>
 
 namespace echorama {
 
@@ -14,6 +15,14 @@ Job* Workspace::Run(QObject* owner, const QString& label, std::function<void(con
                         });
   jobs->Watch(job);
   return job;
+}
+
+void Workspace::BetweenEdits(QObject* owner, const std::function<void()>& edit) const
+{
+  if (session->GetKernel().Editing())
+    QTimer::singleShot(100, owner, [this, owner, edit] { BetweenEdits(owner, edit); });
+  else
+    edit();
 }
 
 JobPanel::JobPanel(Workspace& workspace, QWidget* parent) : QWidget(parent), workspace_(workspace) {}

@@ -288,7 +288,9 @@ void RegistrationPanel::Run(const QString& label, const std::vector<int>& ids, c
       else
         Tell(Message::Warning, tr("Search farther: a volume of before has been removed"));
     };
-  Start(label, work, [this, label, result, farther] { Take(label, *result, farther); });
+  Start(label, work, [this, label, result, farther] {
+    workspace_.BetweenEdits(this, [this, label, result, farther] { Take(label, *result, farther); });
+  });
 }
 
 void RegistrationPanel::PlaceByTracker()
@@ -318,7 +320,8 @@ void RegistrationPanel::PlaceByTracker()
       volume.SetMotion(volume.after * volume.before.inverse());
     }
   };
-  Start(label, work, [this, label, result] { Take(label, *result, {}); });
+  Start(label, work,
+        [this, label, result] { workspace_.BetweenEdits(this, [this, label, result] { Take(label, *result, {}); }); });
 }
 
 void RegistrationPanel::Take(const QString& label, const Result& result, const std::function<void()>& farther)

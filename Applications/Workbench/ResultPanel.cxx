@@ -15,7 +15,6 @@
 #include <QLineEdit>
 #include <QPushButton>
 #include <QSignalBlocker>
-#include <QTimer>
 #include <QToolButton>
 #include <QVBoxLayout>
 #include <vtkCompositeDataSet.h>
@@ -421,15 +420,17 @@ void ResultPanel::Begin(int target, const std::vector<int>& sources, const Resul
       [blocks = vtkSmartPointer<vtkMultiBlockDataSet>(blocks), options, made](const Progress& progress) {
         *made = ResultRecipe::Make(options, blocks, progress);
       },
-      [this, target, record, made] { Put(target, record, *made); });
+      [this, target, sources, record, made] {
+        workspace_.BetweenEdits(this, [this, target, sources, record, made] { Put(target, sources, record, *made); });
+      });
 }
 
-void ResultPanel::Put(int target, const std::string& record, vtkImageData* image)
+void ResultPanel::Put(int target, const std::vector<int>& sources, const std::string& record, vtkImageData* image)
 {
   vtkUltrasoundAlignmentSession* session = workspace_.session;
-  if (session->GetKernel().Editing()) { // it would become a part of the drag
-    const vtkSmartPointer<vtkImageData> kept = image;
-    QTimer::singleShot(100, this, [this, target, record, kept] { Put(target, record, kept); });
+  // Ids are never given twice: without any of them this is another project.
+  if (std::none_of(sources.begin(), sources.end(), [session](int id) { return session->HasVolume(id); })) {
+    workspace_.say(tr("Stitch: result discarded, because its sources were closed in the meantime"), true);
     return;
   }
   const bool isNew = !session->IsResult(target);

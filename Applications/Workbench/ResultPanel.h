@@ -56,7 +56,7 @@ private:
   void ShowForms();
   void ShowState() override;
   void Begin(int target, const std::vector<int>& sources, const ResultRecipe& recipe);
-  void Put(int target, const std::string& record, vtkImageData* image);
+  void Put(int target, const std::vector<int>& sources, const std::string& record, vtkImageData* image);
   std::vector<int> Sources(int target) const;
   int Compared() const;
   QString NameOf(int id) const;

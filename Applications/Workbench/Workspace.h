@@ -23,6 +23,8 @@ struct Workspace {
   /// Job::Start.
   Job* Run(QObject* owner, const QString& label, std::function<void(const Progress&)> work, std::function<void()> done,
            const Message::Answers& answers = {}, const QString& topic = {});
+  /// For what a job found: now, or as soon as nothing is dragged or painted, which it would become a part of.
+  void BetweenEdits(QObject* owner, const std::function<void()>& edit) const;
   std::function<void(const Message& message)> show = [](const Message&) {}; ///< in the window's message bar
   void say(const QString& text, bool isError) const { show({isError ? Message::Warning : Message::Note, text, {}}); }
   std::function<bool(const QString& what)> mayHelp = [](const QString&) { return true; }; ///< else it has said why not

@@ -227,6 +227,20 @@ assert not other.StartRecording(str(recording)) and other.errors and other.GetNu
 other.errors.clear()
 assert other.StopRecording() and second.exists() and not other.errors
 
+# A device that is opened anew, or another one, ends the recording, which says so.
+source = make("simulated:?rate=100&tools=1")
+for i, restart in enumerate((lambda: source.Stop() or source.Start(), lambda: source.SetDevice("simulated:?tools=2"))):
+    ended = folder / f"ended-{i}.igs.mha"
+    assert source.StartRecording(str(ended)) and source.GetRecordingProblem() == ""
+    for _ in range(600):
+        if source.GetNumberOfRecordedPoses() >= 10:
+            break
+        time.sleep(0.02)
+    restart()
+    assert "ended with its device" in source.GetRecordingProblem() and source.GetNumberOfRecordedPoses() >= 10 and ended.exists()
+assert source.StartRecording(str(folder / "next.igs.mha")) and source.GetRecordingProblem() == ""
+assert source.WaitForPoses(1, 60.0) and source.StopRecording() and not source.errors
+
 # A tool that becomes too old makes a picture of its own.
 source = make("simulated:?rate=100&tools=1&unplugAfter=0.05&motion=still", FreshSeconds=0.2)
 assert source.WaitForPoses(3, 60.0)

@@ -163,7 +163,7 @@ void Read(Backup& backup)
     BackupStamp stamp;
     ReadProject(backup.path, &stamp);
     backup.label = stamp.label;
-    backup.inPlaceOf = stamp.inPlaceOf;
+    backup.inPlaceOf = stamp.number == backup.number ? stamp.inPlaceOf : 0; // else it was renamed: numbers were others then
     backup.lineage = stamp.lineage;
     backup.readable = stamp.number > 0; // a project without a stamp was not written here
   } catch (const Error&) {
@@ -383,22 +383,23 @@ void Backups::Move(const std::string& from, const std::string& to)
   const bool neighbours = fs::path(from).parent_path() == fs::path(to).parent_path();
   for (const Backup& backup : moving) {
     const fs::path path = fs::path(to) / FileName(number++, backup.time);
-    if (!neighbours) {
-      try { // names that are relative to the folder become others
-        BackupStamp stamp;
-        const Project project = ReadProject(backup.path, &stamp);
+    try {
+      BackupStamp stamp;
+      const Project project = ReadProject(backup.path, &stamp);
+      if (!neighbours || stamp.inPlaceOf > 0) { // what is relative to the folder becomes another: names of files, numbers
         stamp.number = number - 1;
+        stamp.inPlaceOf = 0;
         std::error_code ignored;
         if (WriteBackup(path.string(), project, stamp)) {
           BringToDisk({path.string()});
           fs::remove(backup.path, ignored);
         }
         continue;
-      } catch (const Error& reason) {
-        if (reason.GetKind() == Error::Kind::FileSystem)
-          continue; // it stays
-      }             // a damaged one comes along as it is
-    }
+      }
+    } catch (const Error& reason) {
+      if (reason.GetKind() == Error::Kind::FileSystem)
+        continue; // it stays
+    }             // a damaged one comes along as it is
     std::error_code error;
     fs::rename(backup.path, path, error);
     if (error) { // another disk

@@ -78,7 +78,8 @@ bool SameWork(const SessionState& a, const SessionState& b)
     right.edition = left.edition;
     return left == right;
   };
-  return a.centre == b.centre && std::equal(a.volumes.begin(), a.volumes.end(), b.volumes.begin(), b.volumes.end(), same);
+  return a.centre == b.centre && a.measurements == b.measurements &&
+         std::equal(a.volumes.begin(), a.volumes.end(), b.volumes.begin(), b.volumes.end(), same);
 }
 
 void Recognize(std::vector<SessionVolume>& volumes, const std::vector<SessionVolume>& known,

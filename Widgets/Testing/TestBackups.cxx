@@ -378,6 +378,38 @@ TEST_F(BackupFolder, AKillLeavesEveryBackupWhole)
     EXPECT_NE(entry.path().filename().string().rfind(".part", 0), 0u) << "what was half-written goes";
 }
 
+// Each says in the place of which number it is, and numbers become others.
+TEST_F(BackupFolder, WhatIsMovedHidesNoOther)
+{
+  const auto labels = [](const std::string& in) {
+    std::vector<std::string> found;
+    for (const Backup& backup : Backups::List(in))
+      found.push_back(backup.label);
+    return found;
+  };
+  const std::string target = Path("target");
+  Backups(target).Write(Step(9), "there");
+  for (const char* name : {"neighbour", "far/away"}) {
+    {
+      Backups backups(Path(name));
+      backups.Write(Step(1), "one");
+      backups.Write(Step(2), "two");
+      backups.Sync();
+      backups.Write(Step(3), "two, going on", true);
+      backups.Sync();
+    }
+    std::vector<std::string> expected{"two, going on", "one"};
+    for (const std::string& label : labels(target))
+      expected.push_back(label);
+    Backups::Move(Path(name), target);
+    EXPECT_EQ(labels(target), expected) << name;
+  }
+  // Also one that was only renamed.
+  PutOld(4, 86400);
+  WriteBackup(Path(Backups::FileName(5, 86400)), Step(5), {7, 86400, "moved", 4});
+  EXPECT_EQ(Numbers(), (std::set<int>{4, 5}));
+}
+
 TEST_F(BackupFolder, SessionsWhoseProcessIsGoneAreFound)
 {
   setenv("XDG_DATA_HOME", Path("data").c_str(), 1);

@@ -120,6 +120,9 @@ TEST_F(ProjectFolder, TheSameWorkWhateverTheIds)
   const SessionState state{{Volume(1, "a", "a.mha")}};
   SessionState other{{Volume(8, "a", "a.mha")}};
   EXPECT_TRUE(SameWork(state, other));
+  other.measurements.push_back({1, {Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitX()}});
+  EXPECT_FALSE(SameWork(state, other));
+  other.measurements.clear();
   other.volumes[0].volumeToWorld.translation().x() += 1e-9;
   EXPECT_FALSE(SameWork(state, other));
 }

@@ -153,13 +153,19 @@ void TestScanBodies::statesThatAreNoneOrOfAnotherBodyAreRefused()
   const QString body = body::WriteWithBall(Folder());
   QVERIFY(window.Open({body}));
   const Pose rest = window.Scan().ProbeToWorld();
-  const QString right = WriteState("right.vti", rest, 5.0);
+  const QString right = WriteState("right.vti", rest, 5.0), damaged = WriteState("damaged.vti", rest, 5.0);
+  QFile file(damaged);
+  QVERIFY(file.open(QIODevice::ReadWrite));
+  const QByteArray text = file.readAll().replace("type=\"Float64\"", "type=\"Float99\"");
+  QVERIFY(file.seek(0) && file.write(text) == text.size());
+  file.close();
   for (const auto& [files, words] : std::vector<std::pair<QStringList, QString>>{
            {{WriteState("far.vti", rest, 5.0, Vector3d(0.0, -60.0, 0.0))},
             "far.vti: the probe that was pressed in by 5 mm lies 5"},
            {{WriteState("mute.vti", rest, 5.0, Vector3d::Zero(), false)}, "mute.vti: it does not say how deep"},
            {{WriteState("none.vti", rest, 0.0)}, "none.vti: the probe was pressed in by 0 mm"},
-           {{right, WriteState("again.vti", rest, 5.0)}, "again.vti: it is as deep as"}}) {
+           {{right, WriteState("again.vti", rest, 5.0)}, "again.vti: it is as deep as"},
+           {{damaged}, "damaged.vti: DataArray has the type"}}) {
     window.Window().Open(files);
     QVERIFY(window.Wait());
     QVERIFY2(window.HasMessage(words), qPrintable(words + " is not among\n" + window.Messages().join('\n')));
@@ -167,6 +173,16 @@ void TestScanBodies::statesThatAreNoneOrOfAnotherBodyAreRefused()
     QCOMPARE(window.Scan().Body().files, QStringList(body));
   }
   QVERIFY(window.HasMessage("it is of another body than " + body));
+  // States are of the body that was there when they were opened.
+  window.Window().Open({right});
+  Subject other = window.Scan().Body();
+  const vtkNew<vtkImageData> copy;
+  copy->ShallowCopy(other.volumes[0]);
+  other.volumes[0] = copy;
+  window.Scan().SetSubject(std::move(other));
+  QVERIFY(window.Wait());
+  QVERIFY2(window.HasMessage("Another body was opened"), qPrintable(window.Messages().join('\n')));
+  QVERIFY(window.Scan().Body().pressed.empty());
   SimulatorUnderTest empty;
   empty.Window().Open({right});
   QVERIFY(empty.Wait());

@@ -2120,6 +2120,10 @@ tempo</translation>
         <translation>Zusammenfügen: zwei Volumen sind nötig, und es gibt nur %1</translation>
     </message>
     <message>
+        <source>Stitch: result discarded, because its sources were closed in the meantime</source>
+        <translation>Zusammenfügen: Ergebnis verworfen, weil seine Quellen inzwischen geschlossen wurden</translation>
+    </message>
+    <message>
         <source>Make a result</source>
         <translation>Ein Ergebnis machen</translation>
     </message>

@@ -36,6 +36,7 @@ private slots:
   void spacePressesTheButtonOfTheFocus();
   void returnAnswers();
   void everyFileThatCannotBeReadIsNamed();
+  void volumesWaitForTheEndOfADrag();
   void posesComeAfterTheirVolumes();
   void volumesComeAfterTheirProject();
   void anyEditIsWork();
@@ -188,6 +189,18 @@ void TestFiles::everyFileThatCannotBeReadIsNamed()
   for (int i = 0; i < 8; i++)
     QVERIFY(window.HasMessage(QString("missing%1.mha").arg(i)));
   window.Screenshot("eight-missing");
+}
+
+void TestFiles::volumesWaitForTheEndOfADrag()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A()}));
+  auto* session = window.Session();
+  session->BeginEdit("a drag");
+  QVERIFY(window.Open({B()}));
+  QCOMPARE(session->GetNumberOfVolumes(), 1);
+  session->CancelEdit();
+  QTRY_COMPARE(session->GetNumberOfVolumes(), 2);
 }
 
 void TestFiles::posesComeAfterTheirVolumes()

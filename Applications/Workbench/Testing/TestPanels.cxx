@@ -61,6 +61,7 @@ private slots:
   void landmarksTellWhatRepeatsApart();
   void aCancelledJobChangesNothing();
   void whatMovedMeanwhileStays();
+  void anAlignmentWaitsForTheEndOfADrag();
   void aTrackerPlacesVolumesBesideTheFirst();
   void stitchingReadsThroughDisplacements();
   void aWindowMayCloseWhileAJobRuns();
@@ -293,6 +294,25 @@ void TestPanels::whatMovedMeanwhileStays()
   put = window.Pose(2);
   QVERIFY(window.Wait());
   QVERIFY(window.Pose(2) == put);
+}
+
+void TestPanels::anAlignmentWaitsForTheEndOfADrag()
+{
+  WindowUnderTest window;
+  QVERIFY(window.Open({A(), B()}));
+  auto* session = window.Session();
+  const auto belongs = window.Pose(2);
+  session->Select(2, true, true);
+  session->TranslateSelection(3.0, -2.0, 1.0);
+  const auto moved = window.Pose(2);
+  const int entries = session->GetUndoCount();
+  window.Part<RegistrationPanel>("registrationPanel")->Refine();
+  session->BeginEdit("a drag");
+  QVERIFY(window.Wait());
+  QVERIFY(window.Pose(2) == moved);
+  session->CancelEdit(); // takes back what is its own
+  QTRY_VERIFY(Distance(window.Pose(2), belongs) < 0.5);
+  QCOMPARE(session->GetUndoCount(), entries + 1);
 }
 
 void TestPanels::aTrackerPlacesVolumesBesideTheFirst()

@@ -8,6 +8,7 @@
 #include "SliceCanvas.h"
 #include "WindowUnderTest.h"
 #include "Workbench.h"
+#include <QAction>
 #include <QCheckBox>
 #include <QComboBox>
 #include <QDockWidget>
@@ -50,8 +51,10 @@ private slots:
   void alignersLeaveResultsAlone();
   void aProjectRemembersTheResult();
   void nothingIsSavedSilentlyWithoutTheResult();
+  void aSaveThatWasLeftClosesNothingLater();
   void moreOptionsReachTheResult();
   void whatIsMadeDuringADragWaitsForItsEnd();
+  void whatIsMadeOfAnotherProjectIsDiscarded();
 
 private:
   void Open(WindowUnderTest& window)
@@ -333,6 +336,22 @@ void TestResults::nothingIsSavedSilentlyWithoutTheResult()
   QVERIFY(!session->GetModifiedSinceSave());
 }
 
+void TestResults::aSaveThatWasLeftClosesNothingLater()
+{
+  WindowUnderTest window;
+  Open(window);
+  QVERIFY(window.Window().Files()->SaveTo(Folder().filePath("p.json")));
+  Make(window);
+  window.Window().close();
+  QVERIFY(window.Answer("Save"));
+  QVERIFY(window.HasMessage("result is in no file yet")); // and stays without an answer
+  window.Part<QAction>("save")->trigger();
+  QVERIFY(window.Answer("Save it there"));
+  QVERIFY(window.Wait());
+  QTRY_VERIFY(!window.Session()->GetModifiedSinceSave());
+  QVERIFY(window.Window().isVisible());
+}
+
 void TestResults::moreOptionsReachTheResult()
 {
   WindowUnderTest window;
@@ -405,6 +424,20 @@ void TestResults::whatIsMadeDuringADragWaitsForItsEnd()
   session->EndEdit();
   QVERIFY(QTest::qWaitFor([&] { return session->GetNumberOfVolumes() == 3; }, 5000));
   QCOMPARE(session->GetSourcesChanged(session->GetVolumeId(2)), std::string("right was moved")); // it is of what was there before
+}
+
+void TestResults::whatIsMadeOfAnotherProjectIsDiscarded()
+{
+  const QString project = Folder().filePath("p.json");
+  WindowUnderTest window;
+  Open(window);
+  auto* session = window.Session();
+  QVERIFY(window.Window().Files()->SaveTo(project));
+  window.Part<ResultPanel>("resultPanel")->Make(true);
+  QVERIFY(session->OpenProject(project.toUtf8().constData()));
+  QVERIFY(window.Wait());
+  QVERIFY2(window.HasMessage("its sources were closed"), qPrintable(window.Messages().join('\n')));
+  QCOMPARE(session->GetNumberOfVolumes(), 2);
 }
 
 int main(int argc, char** argv)
