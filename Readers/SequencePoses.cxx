@@ -65,6 +65,12 @@ std::string ChooseWorldFrame(const TransformGraph& graph, const std::string& ima
   return ends[0];
 }
 
+bool AreAxesOfGrid(const Eigen::Affine3d& imageToWorld, const std::array<int, 3>& dimensions)
+{
+  const Eigen::Matrix3d axes = imageToWorld.linear();
+  return dimensions[2] == 1 || axes.col(0).cross(axes.col(1)).normalized().dot(axes.col(2).normalized()) > CosineOfADegree;
+}
+
 ImageGeometry FrameGeometry(const Eigen::Affine3d& imageToWorld, const std::array<int, 3>& dimensions)
 {
   ImageGeometry grid;
@@ -77,7 +83,7 @@ ImageGeometry FrameGeometry(const Eigen::Affine3d& imageToWorld, const std::arra
   grid.direction.col(0) = (sum + difference).normalized();
   grid.direction.col(1) = (sum - difference).normalized();
   grid.direction.col(2) = grid.direction.col(0).cross(grid.direction.col(1));
-  if (dimensions[2] > 1 && !(grid.direction.col(2).dot(imageToWorld.linear().col(2)) > CosineOfADegree * grid.spacing[2]))
+  if (!AreAxesOfGrid(imageToWorld, dimensions))
     throw Error(Error::Kind::NotPossible, "frames of " + std::to_string(dimensions[2]) +
                                               " slices cannot be placed by axes that are left-handed or not perpendicular");
   const Eigen::Vector3d middle((dimensions[0] - 1) / 2.0, (dimensions[1] - 1) / 2.0, (dimensions[2] - 1) / 2.0);

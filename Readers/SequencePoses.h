@@ -16,11 +16,14 @@ namespace echorama {
 /// or several qualify.
 std::string ChooseWorldFrame(const TransformGraph& graph, const std::string& image, const std::string& requested);
 
+/// Whether frames of several slices can be placed so: the third axis points, to a degree, where that of a right-handed grid with
+/// the other two does. Those of one slice always can.
+bool AreAxesOfGrid(const Eigen::Affine3d& imageToWorld, const std::array<int, 3>& dimensions);
+
 /// The grid nearest to pixels of \a dimensions under \a imageToWorld that is a rigid pose with a spacing: its x and y axes are
 /// turned by the same small angle to become perpendicular, about the middle of the frame. The third axis is perpendicular to
 /// both and only its spacing is that of the matrix. \a imageToWorld must not be singular.
-/// \throws Error(NotPossible) when there are several slices and the third axis of the matrix does not point, to a degree, where
-/// that of the grid does: they would be mirrored or sheared.
+/// \throws Error(NotPossible) when they are not AreAxesOfGrid(): slices would be mirrored or sheared.
 ImageGeometry FrameGeometry(const Eigen::Affine3d& imageToWorld, const std::array<int, 3>& dimensions);
 
 /// Where the frames of a sequence lie, composed by name from the transforms of the file and fixed ones (a calibration).

@@ -308,7 +308,7 @@ void AlignVolumesRun::FindTheLost(const Progress& progress)
         continue;
       std::vector<std::pair<double, Numbers>> others; // by distance
       for (int other = 0; other < Count(); ++other)
-        if (graph_.isPlaced[Index(other)] && CanBeAligned(other))
+        if (graph_.isPlaced[Index(other)] && CanBeAligned(other) && tried.count(Ordered(v, other)) == 0)
           others.push_back({(centre(Index(other)) - centre(Index(v))).norm(), Ordered(v, other)});
       std::sort(others.begin(), others.end());
       others.resize(std::min(others.size(), Index(FarTries)));
@@ -319,8 +319,7 @@ void AlignVolumesRun::FindTheLost(const Progress& progress)
         end = std::min(i + Index(shared_.Ranks()), others.size());
         std::vector<Numbers> pairs;
         for (std::size_t next = i; next < end; ++next)
-          if (tried.count(others[next].second) == 0)
-            pairs.push_back(others[next].second);
+          pairs.push_back(others[next].second);
         const std::vector<PairAlignment> found = Answers(pairs, AlignStart::Unknown, graph_.volumeToWorld,
                                                          part.Part(static_cast<double>(v) / Count(), (v + 1.0) / Count()));
         for (std::size_t pair = 0; pair < pairs.size() && !isFound; ++pair) {

@@ -154,7 +154,8 @@ struct ReplayTracker::Recording {
     if (placed && placed->ImageIsPlaced()) {
       placed->MoveTo(frame);
       const ComposedTransform toWorld = placed->Find(placed->Image());
-      if (toWorld.status == TransformStatus::Valid && toWorld.matrix.matrix().allFinite())
+      if (toWorld.status == TransformStatus::Valid && toWorld.matrix.matrix().allFinite() &&
+          AreAxesOfGrid(toWorld.matrix, content.dimensions))
         image.geometry = FrameGeometry(toWorld.matrix, content.dimensions);
     }
     image.type = content.type;

@@ -57,7 +57,8 @@ std::optional<ShownImage> ChooseImage(std::vector<StreamedImage> images, const L
   for (const StreamedImage& image : images) {
     const LiveTransform found = transforms.Find(imageFrame, world, image.time);
     const bool placed = !std::isnan(image.time) && found.Status() == TransformStatus::Valid &&
-                        std::abs(found.transform.matrix.linear().determinant()) > 1e-12;
+                        std::abs(found.transform.matrix.linear().determinant()) > 1e-12 &&
+                        AreAxesOfGrid(found.transform.matrix, image.geometry.dimensions);
     if (placed)
       return ShownImage{image, found.transform.matrix, FrameGeometry(found.transform.matrix, image.geometry.dimensions)};
     if (!chosen)

@@ -22,9 +22,10 @@ StreamedImage ImageAt(const std::string& name, double time)
 // A tool that was seen from 1 to 2 s, with the image fixed to it.
 struct Scene {
   PoseStream stream;
-  LiveTransforms transforms{stream, {{"Image", "Probe", Eigen::Affine3d(Eigen::Scaling(0.5)), TransformStatus::Valid, {}, ""}}};
+  LiveTransforms transforms;
 
-  Scene()
+  explicit Scene(const Eigen::Vector3d& scale = Eigen::Vector3d::Constant(0.5))
+    : transforms(stream, {{"Image", "Probe", Eigen::Affine3d(Eigen::Scaling(scale)), TransformStatus::Valid, {}, ""}})
   {
     for (const double time : {1.0, 1.5, 2.0})
       stream.Add({"ProbeToTracker", time, NaN, Pose(Eigen::Translation3d(10.0 * time, 0.0, 0.0)), TransformStatus::Valid});
@@ -66,6 +67,17 @@ TEST(ShownImage, WithoutAPlaceItIsTheNewestWhereTheSenderPutsIt)
   EXPECT_FALSE(shown->imageToWorld);
   EXPECT_EQ(shown->geometry.origin, Eigen::Vector3d::Zero());
   EXPECT_FALSE(scene.Choose({}));
+}
+
+TEST(ShownImage, SlicesThatWouldBeMirroredHaveNoPlace)
+{
+  StreamedImage image = ImageAt("volume", 1.5);
+  image.geometry.dimensions[2] = 2;
+  image.voxels = std::make_shared<const std::vector<unsigned char>>(24);
+  EXPECT_TRUE(Scene().Choose({image})->imageToWorld);
+  const auto shown = Scene({0.5, 0.5, -0.5}).Choose({image});
+  ASSERT_TRUE(shown);
+  EXPECT_FALSE(shown->imageToWorld);
 }
 
 TEST(ShownImage, WithATimeItIsTheNearestToThat)

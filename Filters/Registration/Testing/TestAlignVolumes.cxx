@@ -281,7 +281,7 @@ TEST(AlignVolumes, TheLostAreFoundInAnyOrder)
   Ring ring(6);
   std::swap(ring.truth[3], ring.truth[5]);
   std::swap(ring.starts[3], ring.starts[5]);
-  ring.starts[3].translation() += Eigen::Vector3d(-500.0, 0.0, 0.0);
+  ring.starts[3].translation() += Eigen::Vector3d(500.0, 0.0, 0.0);
   ring.starts[4].translation() += Eigen::Vector3d(0.0, 500.0, 0.0);
   ring.starts[5].translation() += Eigen::Vector3d(0.0, -500.0, 0.0);
   const AlignVolumesResult result = AlignVolumes(ring.Volumes(), 0, {}, {}, ring.Aligner());
