@@ -188,7 +188,7 @@ void vtkUltrasoundTrackerSource::Open(std::shared_ptr<echorama::PoseSubscription
     auto device = echorama::MakeTracker(this->Device);
     auto* recording = this->FollowTime ? dynamic_cast<echorama::ReplayTracker*>(device.get()) : nullptr;
     if (recording) {
-      limits.posesPerTool = std::numeric_limits<std::size_t>::max(); // whatever it holds; memory is taken as it is needed
+      limits.posesPerTool = 1000000; // whatever it holds; memory is taken as it is needed
     }
     auto session = std::make_unique<Session>(limits);
     session->Device = std::move(device); // from here on: should anything throw, it goes before what it writes to

@@ -48,7 +48,7 @@ ParameterList Describe(StreamLimits& p)
       Parameter("LongestGapSeconds", p.longestGapSeconds, {0, 600, true}, "s",
                 "Poses that lie further apart in time are not interpolated. Counts when the device is opened.")
           .Advanced(),
-      Parameter("PosesPerTool", p.posesPerTool, {2, Unlimited}, "", "The newest poses of a tool that are remembered."),
+      Parameter("PosesPerTool", p.posesPerTool, {2, 1000000}, "", "The newest poses of a tool that are remembered."),
       Parameter("Tools", p.tools, {1, 4096}, "", "The most tools of which poses are taken."),
       Parameter(
           "JumpSeconds", p.jumpSeconds, {0, 600, true}, "s",
