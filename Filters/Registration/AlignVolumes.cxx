@@ -297,7 +297,8 @@ PoseEdge AlignVolumesRun::AsSeenFromFixed(PoseEdge edge) const
   return edge;
 }
 
-// Volumes that are not placed are looked for in any rotation beside those that are; again beside those that were found since.
+// Volumes that are not placed are looked for in any rotation beside the nearest that are; beside others as long as that places
+// any.
 void AlignVolumesRun::FindTheLost(const Progress& progress)
 {
   const auto centre = [this](std::size_t v) { return Eigen::Vector3d(graph_.volumeToWorld[v] * outlines_[v].shape.centroid); };
