@@ -1,84 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A binary tree over the boxes, halved at the median of their centres along the longest axis. It is asked once for each box, and
-// tells of those that come after it.
 #include "BoxTree.h"
 #include "Index.h"
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <unsupported/Eigen/BVH>
 
 namespace echorama {
 namespace {
 
-class Tree {
-public:
-  explicit Tree(const std::vector<Eigen::AlignedBox3d>& boxes) : boxes_(boxes)
+// What the tree is asked: the boxes after one that meet it.
+struct After {
+  const std::vector<Eigen::AlignedBox3d>& boxes;
+  int number;
+  std::vector<int> found = {};
+  bool intersectVolume(const Eigen::AlignedBox3d& node) const { return node.intersects(boxes[Index(number)]); }
+  bool intersectObject(int other)
   {
-    for (std::size_t i = 0; i < boxes.size(); ++i)
-      if (!boxes[i].isEmpty())
-        order_.push_back(static_cast<int>(i));
-    if (!order_.empty())
-      Grow(0, order_.size());
+    if (other > number && boxes[Index(other)].intersects(boxes[Index(number)]))
+      found.push_back(other);
+    return false; // there may be more
   }
-
-  /// Calls found(other) for each box that meets it.
-  template <class Found>
-  void Ask(const Eigen::AlignedBox3d& box, const Found& found) const
-  {
-    if (!nodes_.empty())
-      Ask(0, box, found);
-  }
-
-private:
-  static constexpr std::size_t LeafSize = 4;
-  struct Node {
-    Eigen::AlignedBox3d box;
-    std::size_t first, end; // of a leaf's boxes, in order_
-    std::size_t far = 0;    // its second child; the first follows it; 0: a leaf
-  };
-
-  void Grow(std::size_t first, std::size_t end)
-  {
-    const std::size_t self = nodes_.size();
-    nodes_.push_back({Eigen::AlignedBox3d(), first, end});
-    Eigen::AlignedBox3d centres;
-    for (std::size_t i = first; i < end; ++i) {
-      nodes_[self].box.extend(boxes_[Index(order_[i])]);
-      centres.extend(boxes_[Index(order_[i])].center());
-    }
-    if (end - first <= LeafSize)
-      return;
-    int axis = 0;
-    centres.sizes().maxCoeff(&axis);
-    const auto begin = order_.begin() + static_cast<std::ptrdiff_t>(first);
-    const std::size_t middle = first + (end - first) / 2;
-    std::nth_element(begin, order_.begin() + static_cast<std::ptrdiff_t>(middle),
-                     order_.begin() + static_cast<std::ptrdiff_t>(end),
-                     [&](int a, int b) { return boxes_[Index(a)].center()[axis] < boxes_[Index(b)].center()[axis]; });
-    Grow(first, middle);
-    nodes_[self].far = nodes_.size();
-    Grow(middle, end);
-  }
-
-  template <class Found>
-  void Ask(std::size_t self, const Eigen::AlignedBox3d& box, const Found& found) const
-  {
-    const Node& node = nodes_[self];
-    if (!node.box.intersects(box))
-      return;
-    if (node.far == 0) {
-      for (std::size_t i = node.first; i < node.end; ++i)
-        if (boxes_[Index(order_[i])].intersects(box))
-          found(order_[i]);
-      return;
-    }
-    Ask(self + 1, box, found);
-    Ask(node.far, box, found);
-  }
-
-  const std::vector<Eigen::AlignedBox3d>& boxes_;
-  std::vector<int> order_;
-  std::vector<Node> nodes_;
 };
 
 } // namespace
@@ -114,16 +55,21 @@ bool Meet(const TurnedBox& a, const TurnedBox& b)
 
 std::vector<std::pair<int, int>> PairsThatMeet(const std::vector<Eigen::AlignedBox3d>& boxes)
 {
-  const Tree tree(boxes);
+  std::vector<int> numbers;
+  std::vector<Eigen::AlignedBox3d> filled;
+  for (std::size_t i = 0; i < boxes.size(); ++i)
+    if (!boxes[i].isEmpty()) {
+      numbers.push_back(static_cast<int>(i));
+      filled.push_back(boxes[i]);
+    }
+  const Eigen::KdBVH<double, 3, int> tree(numbers.begin(), numbers.end(), filled.begin(), filled.end());
   std::vector<std::pair<int, int>> pairs;
-  for (std::size_t a = 0; a < boxes.size(); ++a) {
-    const auto begin = static_cast<std::ptrdiff_t>(pairs.size());
-    if (!boxes[a].isEmpty())
-      tree.Ask(boxes[a], [&](int b) {
-        if (Index(b) > a)
-          pairs.emplace_back(static_cast<int>(a), b);
-      });
-    std::sort(pairs.begin() + begin, pairs.end());
+  for (const int a : numbers) {
+    After after{boxes, a};
+    Eigen::BVIntersect(tree, after);
+    std::sort(after.found.begin(), after.found.end());
+    for (const int b : after.found)
+      pairs.emplace_back(a, b);
   }
   return pairs;
 }
