@@ -28,14 +28,6 @@ vtkUltrasoundParametersMacro(vtkUltrasoundAlignmentScore);
 
 namespace {
 constexpr double NotANumber = std::numeric_limits<double>::quiet_NaN();
-
-vtkSmartPointer<vtkDoubleArray> NewNumbers(const char* name, int components = 1)
-{
-  auto array = vtkSmartPointer<vtkDoubleArray>::New();
-  array->SetName(name);
-  array->SetNumberOfComponents(components);
-  return array;
-}
 } // namespace
 
 //----------------------------------------------------------------------------
@@ -101,13 +93,11 @@ int vtkUltrasoundAlignmentScore::RequestData(vtkInformation*, vtkInformationVect
     const echorama::AlignmentScore score = echorama::ScoreAlignment(volumes, this->Values.fixedVolume);
 
     // 3. what goes out
-    const auto errors = NewNumbers("Error", 3), mean = NewNumbers("VolumeScore"), rms = NewNumbers("VolumeRms"),
-               median = NewNumbers("VolumeMedian"), percentile = NewNumbers("VolumePercentile95"), max = NewNumbers("VolumeMax"),
-               total = NewNumbers("Score");
+    vtkNew<vtkDoubleArray> errors;
+    errors->SetName("Error");
+    errors->SetNumberOfComponents(3);
     vtkNew<vtkIntArray> ids;
     ids->SetName("Volume");
-    vtkNew<vtkStringArray> names;
-    names->SetName("VolumeName");
     vtkNew<vtkPoints> points;
     points->SetDataTypeToDouble();
     vtkNew<vtkCellArray> vertices;
@@ -119,16 +109,9 @@ int vtkUltrasoundAlignmentScore::RequestData(vtkInformation*, vtkInformationVect
         errors->InsertNextTuple(volume.errors[p].data());
         ids->InsertNextValue(static_cast<int>(i));
       }
-      mean->InsertNextValue(volume.mean);
-      rms->InsertNextValue(volume.rms);
-      median->InsertNextValue(volume.median);
-      percentile->InsertNextValue(volume.percentile95);
-      max->InsertNextValue(volume.max);
-      names->InsertNextValue(volumes[i].name);
       this->VolumeScores.push_back(volume.mean);
     }
     this->Score = score.mean;
-    total->InsertNextValue(score.mean);
 
     vtkInformation* out = outputs->GetInformationObject(0);
     vtkPolyData* output = vtkPolyData::GetData(out);
@@ -138,8 +121,22 @@ int vtkUltrasoundAlignmentScore::RequestData(vtkInformation*, vtkInformationVect
       output->GetPointData()->AddArray(ids);
       output->GetPointData()->SetVectors(errors);
     }
-    for (vtkDataArray* array : {total.Get(), mean.Get(), rms.Get(), median.Get(), percentile.Get(), max.Get()}) {
-      output->GetFieldData()->AddArray(array);
+    vtkUltrasoundVolume::AddField(output, "Score", &score.mean, 1);
+    using Of = echorama::VolumeScore;
+    for (const auto& [name, number] :
+         {std::pair("VolumeScore", &Of::mean), std::pair("VolumeRms", &Of::rms), std::pair("VolumeMedian", &Of::median),
+          std::pair("VolumePercentile95", &Of::percentile95), std::pair("VolumeMax", &Of::max)}) {
+      vtkNew<vtkDoubleArray> values;
+      values->SetName(name);
+      for (const echorama::VolumeScore& volume : score.volumes) {
+        values->InsertNextValue(volume.*number);
+      }
+      output->GetFieldData()->AddArray(values);
+    }
+    vtkNew<vtkStringArray> names;
+    names->SetName("VolumeName");
+    for (const echorama::ScoredVolume& volume : volumes) {
+      names->InsertNextValue(volume.name);
     }
     output->GetFieldData()->AddArray(names);
   });
