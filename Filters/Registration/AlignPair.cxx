@@ -93,7 +93,7 @@ public:
     : fixed_(fixed), moving_(moving), fixedFeatures_(fixedFeatures), movingFeatures_(movingFeatures), p_(p), shape_(moving),
       fixedShape_(fixed)
   {
-    const auto finest = [](const PlacedVolume& v) { return v.pyramid->front().geometry.spacing.maxCoeff(); };
+    const auto finest = [](const PlacedVolume& v) { return std::cbrt(v.pyramid->front().geometry.spacing.prod()); };
     finestMm_ = std::max({p.finestMm, finest(fixed), finest(moving)});
     // Coarse: some 32 voxels along the smaller of both; never finer than what there is.
     coarseMm_ = std::max(finestMm_, std::min(shape_.extent, fixedShape_.extent) / 32.0);

@@ -3,6 +3,7 @@
 #include "RandomScene.h"
 #include "Testing/Sanitized.h"
 #include <algorithm>
+#include <cmath>
 #include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
 
@@ -37,6 +38,20 @@ AlignPairParameters With(AlignStart start)
   AlignPairParameters p;
   p.start = start;
   return p;
+}
+
+TEST(AlignPair, VoxelsThatAreNoCubesAreUsedAtFullResolution)
+{
+  Windows windows(Scene(5), Scene(5));
+  const Eigen::Vector3d spacing(2.5, 2.5, 3.5);
+  windows.a.dimensions = {36, 34, 22};
+  windows.b.dimensions = {34, 31, 24};
+  windows.a.spacing = windows.b.spacing = spacing;
+  windows.pa = PyramidOf(See(Scene(5), windows.a), windows.a);
+  windows.pb = PyramidOf(See(Scene(5), windows.b), windows.b);
+  const PairAlignment found = windows.Align(Knock(windows, 3.0, 3.0, 1), With(AlignStart::Tracked));
+  EXPECT_EQ(found.verdict, Verdict::Aligned) << found.reason;
+  EXPECT_NEAR(found.voxelMm, std::cbrt(spacing.prod()), 1e-9);
 }
 
 TEST(AlignPair, FindsTheWayHomeAndSaysSo)
