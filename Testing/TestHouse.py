@@ -35,8 +35,9 @@ for path in [*ours("*.h"), *ours("*.cxx")]:
         continue
     if not path.name.startswith("vtk") and re.search(r'#include [<"]vtk', text):
         complaints.append(f"{name}: a kernel includes VTK")
-    if re.search(r"#include <(tbb|oneapi|thread>|omp)", text) and str(name) not in ("Core/Base/Parallel.cxx", "Core/Base/Worker.cxx"):
-        complaints.append(f"{name}: names a threading library; use Core/Base/Parallel.h, or Worker.h to wait for a device")
+    threading = ("Core/Base/Parallel.cxx", "Core/Base/Worker.cxx", "Core/Sharing/SideBySide.cxx")
+    if re.search(r"#include <(tbb|oneapi|thread>|omp)", text) and str(name) not in threading:
+        complaints.append(f"{name}: names a threading library; use Core/Base/Parallel.h, SideBySide.h for long tasks, or Worker.h to wait for a device")
     if re.search(r"\b(mt19937|std::rand|srand|random_device)\b", text):
         complaints.append(f"{name}: randomness that is not Core/Base/Random.h")
 

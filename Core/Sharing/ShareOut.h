@@ -6,10 +6,11 @@
 
 namespace echorama {
 
-/// What `find(i, begin, end)` finds for each of \a count items, on every rank: each does a piece of them, and they tell each
-/// other after every \a atOnce. From begin to end is item i 's part of what this rank does, in [0, 1]. T is packed and unpacked
-/// by the functions Pack(Packed&, const T&) and Unpack(Unpacked&, T&). \param hear hear(i, found) is called for each item, as
-/// soon as it is known \param about see SharedWork::Exchange
+/// What `find(first, count, begin, end)` finds for each of \a count items, on every rank: each does a piece of them, and they
+/// tell each other after every \a atOnce. It finds the first of these items, and as many more as it likes, in their order; from
+/// begin to end is their part of what this rank does, in [0, 1]. T is packed and unpacked by the functions Pack(Packed&, const
+/// T&) and Unpack(Unpacked&, T&). \param hear hear(i, found) is called for each item, as soon as it is known \param about see
+/// SharedWork::Exchange
 template <class T, class Find, class Hear>
 std::vector<T> ShareOut(SharedWork& shared, std::size_t count, std::size_t atOnce, const std::string& about, const Find& find,
                         const Hear& hear)
@@ -18,28 +19,32 @@ std::vector<T> ShareOut(SharedWork& shared, std::size_t count, std::size_t atOnc
   const auto items = static_cast<std::ptrdiff_t>(count), step = static_cast<std::ptrdiff_t>(atOnce);
   const std::ptrdiff_t most = (items + shared.Ranks() - 1) / shared.Ranks(); // of any rank
   for (std::ptrdiff_t done = 0; done < most; done += step) {
-    const auto forEachOf = [&](int rank, const auto& visit) {
+    const auto pieceOf = [&](int rank) {
       const auto [first, last] = shared.ShareOf(rank, items);
-      for (std::ptrdiff_t i = first + done; i < std::min(last, first + done + step); ++i)
-        visit(static_cast<std::size_t>(i), static_cast<double>(i - first) / static_cast<double>(last - first),
-              static_cast<double>(i - first + 1) / static_cast<double>(last - first));
+      return std::pair(first + done, std::min(last, first + done + step));
     };
     Packed mine;
-    forEachOf(shared.Rank(), [&](std::size_t i, double begin, double end) {
-      all[i] = find(i, begin, end);
-      hear(i, all[i]);
-      if (shared.Ranks() > 1)
-        Pack(mine, all[i]);
-    });
+    const auto [first, last] = shared.Share(items);
+    const auto part = [first = first, all = static_cast<double>(last - first)](std::ptrdiff_t i) {
+      return static_cast<double>(i - first) / all;
+    };
+    for (auto [i, end] = pieceOf(shared.Rank()); i < end;)
+      for (T& found : find(static_cast<std::size_t>(i), static_cast<std::size_t>(end - i), part(i), part(end))) {
+        T& item = all[static_cast<std::size_t>(i)] = std::move(found);
+        hear(static_cast<std::size_t>(i++), item);
+        if (shared.Ranks() > 1)
+          Pack(mine, item);
+      }
     const std::vector<std::string> told = shared.Exchange(mine.Bytes(), about);
     for (int rank = 0; rank < shared.Ranks(); ++rank) {
       if (rank == shared.Rank())
         continue;
       Unpacked from(told[static_cast<std::size_t>(rank)]);
-      forEachOf(rank, [&](std::size_t i, double, double) {
-        Unpack(from, all[i]);
-        hear(i, all[i]);
-      });
+      for (auto [i, end] = pieceOf(rank); i < end; ++i) {
+        T& item = all[static_cast<std::size_t>(i)];
+        Unpack(from, item);
+        hear(static_cast<std::size_t>(i), item);
+      }
     }
   }
   return all;

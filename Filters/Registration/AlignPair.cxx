@@ -25,6 +25,8 @@
 #include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/SymmetricMatrix.h"
+#include "Core/Sharing/SideBySide.h"
+#include "Index.h"
 #include "VolumeShape.h"
 #include <algorithm>
 #include <array>
@@ -242,10 +244,10 @@ public:
     const Information covariance = CovarianceOf(best.information, shape_.radius);
     result.errorMm = ErrorOf(best);
     std::array<Pose, 2> halves;
-    for (int half = 0; half < 2; ++half)
-      halves[static_cast<std::size_t>(half)] = Local(best.volumeToWorld, closerMm, finestMm_, p_.points, half + 1,
-                                                     progress.Part(0.9 + 0.05 * half, 0.95 + 0.05 * half))
-                                                   .volumeToWorld;
+    SideBySide(2, progress.Part(0.9, 1.0), [&](std::ptrdiff_t half, const Progress& part) {
+      halves[Index(half)] =
+          Local(best.volumeToWorld, closerMm, finestMm_, p_.points, static_cast<int>(half) + 1, part).volumeToWorld;
+    });
     result.splitMm = shape_.Distance(halves[0], halves[1]);
     Judge(p_, covariance, shape_.radius, result);
     result.confidenceSeconds = SecondsSince(start);
@@ -333,11 +335,10 @@ private:
   std::vector<LocalAlignResult> Refine(const std::vector<Pose>& poses, double coarsestMm, double finestMm,
                                        const Progress& progress) const
   {
-    std::vector<LocalAlignResult> all, different;
-    const double count = static_cast<double>(poses.size());
-    for (std::size_t i = 0; i < poses.size(); ++i)
-      all.push_back(Local(poses[i], coarsestMm, finestMm, FewerPoints(), 0,
-                          progress.Part(static_cast<double>(i) / count, static_cast<double>(i + 1) / count)));
+    std::vector<LocalAlignResult> all(poses.size()), different;
+    SideBySide(static_cast<std::ptrdiff_t>(poses.size()), progress, [&](std::ptrdiff_t i, const Progress& part) {
+      all[Index(i)] = Local(poses[Index(i)], coarsestMm, finestMm, FewerPoints(), 0, part);
+    });
     std::stable_sort(all.begin(), all.end(),
                      [](const LocalAlignResult& a, const LocalAlignResult& b) { return Evidence(a) > Evidence(b); });
     for (const LocalAlignResult& one : all)

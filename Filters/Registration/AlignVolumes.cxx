@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What a metric sees of a volume is computed once and serves all its pairs while memory lasts (PreparedVolumes). The coarsest
-// resolution of every volume is kept: it tells which volumes overlap. Pairs are aligned one after the other, each by all
-// threads; then the pose graph votes. Pairs that were voted down, failed from a bad start or were not expected to overlap are
-// aligned again from where others place their volumes, which is as good a start as a tracker's.
+// resolution of every volume is kept: it tells which volumes overlap. Pairs are aligned several at once, for one by itself leaves
+// threads waiting; then the pose graph votes. Pairs that were voted down, failed from a bad start or were not expected to overlap
+// are aligned again from where others place their volumes, which is as good a start as a tracker's.
 //
 // Ranks share the coarsest resolutions, of which each makes some, and the pairs of a round: each aligns a piece of their order
 // for reuse, so that it prepares few of the volumes. Every rank hears of all that was found and solves the graph itself.
@@ -13,6 +13,7 @@
 #include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Error.h"
 #include "Core/Sharing/ShareOut.h"
+#include "Core/Sharing/SideBySide.h"
 #include "Index.h"
 #include <algorithm>
 #include <chrono>
@@ -25,7 +26,7 @@ namespace {
 
 constexpr int EnoughPairs = 3;         // a volume with fewer overlaps at the start is also paired with those farther off
 constexpr int FarTries = 3;            // searches over all rotations for one volume
-constexpr std::size_t PlanSamples = 3; // pairs that are aligned to see how long they take
+constexpr std::size_t PlanSamples = 3; // pairs that are aligned to see how long they take, at least
 constexpr double TrackedReachMm = 20.0;
 constexpr std::size_t PairsPerExchange = 32; // of a rank; what fails on one is heard by the others no later
 
@@ -65,7 +66,7 @@ void AlignVolumesRun::Outline(int v, bool isPlan, const Progress& progress)
   };
   try {
     const bool mayBeKnown = shared_.Ranks() == 1 ? !finished_.Empty() : !p_.resources.finishedPairs.empty();
-    if (!isPlan && !mayBeKnown && prepared_.HasRoom()) {
+    if (!isPlan && !mayBeKnown && prepared_.HasRoomFor({v})) {
       outlines_.emplace_back(prepared_.Get(v, progress)->placed);
       return;
     }
@@ -151,24 +152,58 @@ AlignVolumesRun::Question AlignVolumesRun::Ask(const Numbers& numbers, AlignStar
   return question;
 }
 
-PairAlignment AlignVolumesRun::Answer(const Numbers& numbers, const Question& question, const Progress& progress)
+// Of the first of the pairs, side by side: as many as keep all threads busy and there is memory for, and at least one. A pair by
+// itself is too small for many threads. Those that are done when one fails are kept.
+std::vector<PairAlignment> AlignVolumesRun::FirstAnswers(const std::vector<Numbers>& pairs, AlignStart start,
+                                                         const std::vector<Pose>& poses, const Progress& progress)
 {
-  PairAlignment found;
-  const Clock::time_point clock = Clock::now();
-  const double before = featureSeconds_;
-  try {
-    const PreparedVolumes::Made fixed = prepared_.Get(numbers.first, progress.Part(0.0, 0.0)),
-                                moving = prepared_.Get(numbers.second, progress.Part(0.0, 0.0));
-    found = aligner_(fixed->At(question.fixed.volumeToWorld), fixed->features, moving->At(question.moving.volumeToWorld),
-                     moving->features, question.parameters, progress);
-  } catch (const Error& error) {
-    if (Count() == 2 || (error.GetKind() != Error::Kind::BadInput && error.GetKind() != Error::Kind::NotPossible))
-      throw;
-    found.volumeToWorld = question.moving.volumeToWorld;
-    found.reason = error.what();
+  std::vector<Question> questions;
+  std::vector<std::pair<PreparedVolumes::Made, PreparedVolumes::Made>> made;
+  std::vector<PairAlignment> answers;
+  const auto attempt = [&](std::size_t i, const auto& body) {
+    try {
+      body();
+    } catch (const Error& error) {
+      if (Count() == 2 || (error.GetKind() != Error::Kind::BadInput && error.GetKind() != Error::Kind::NotPossible))
+        throw;
+      answers[i].volumeToWorld = questions[i].moving.volumeToWorld;
+      answers[i].reason = error.what();
+    }
+  };
+  for (std::size_t i = 0; i < std::min(pairs.size(), static_cast<std::size_t>(TasksAtOnce())); ++i) {
+    const auto [a, b] = pairs[i];
+    if (i > 0 && !prepared_.HasRoomFor({a, b}))
+      break;
+    questions.push_back(Ask(pairs[i], start, poses));
+    made.emplace_back();
+    answers.emplace_back();
+    attempt(i, [&, a = a, b = b] {
+      made[i] = {prepared_.Get(a, progress.Part(0.0, 0.0)), prepared_.Get(b, progress.Part(0.0, 0.0))};
+    });
   }
-  pairSeconds_ += SecondsSince(clock) - (featureSeconds_ - before);
-  return found;
+  const Clock::time_point clock = Clock::now();
+  std::vector<char> isDone(questions.size(), 0);
+  const auto align = [&](std::ptrdiff_t task, const Progress& part) {
+    const auto i = static_cast<std::size_t>(task);
+    const auto& [fixed, moving] = made[i];
+    if (moving)
+      attempt(i, [&, fixed = fixed, moving = moving] {
+        answers[i] = aligner_(fixed->At(questions[i].fixed.volumeToWorld), fixed->features,
+                              moving->At(questions[i].moving.volumeToWorld), moving->features, questions[i].parameters, part);
+      });
+    isDone[i] = 1;
+  };
+  try {
+    const auto count = static_cast<std::ptrdiff_t>(questions.size());
+    SideBySide(count, progress.Part(0.0, static_cast<double>(count) / static_cast<double>(pairs.size())), align);
+  } catch (...) {
+    for (std::size_t i = 0; i < questions.size(); ++i)
+      if (isDone[i] != 0)
+        finished_.Add(questions[i].key, answers[i]);
+    throw;
+  }
+  pairSeconds_ += SecondsSince(clock);
+  return answers;
 }
 
 // By all ranks, each a piece of those that are not known from the first one's file.
@@ -196,8 +231,11 @@ std::vector<PairAlignment> AlignVolumesRun::Answers(const std::vector<Numbers>& 
       left.push_back(i);
   }
   finishedBefore_ += static_cast<int>(pairs.size() - left.size());
-  const auto answer = [&](std::size_t i, double begin, double end) {
-    return Answer(pairs[left[i]], Ask(pairs[left[i]], start, poses), progress.Part(begin, end));
+  const auto answer = [&](std::size_t first, std::size_t count, double begin, double end) {
+    std::vector<Numbers> next;
+    for (std::size_t i = first; i < first + count; ++i)
+      next.push_back(pairs[left[i]]);
+    return FirstAnswers(next, start, poses, progress.Part(begin, end));
   };
   const auto hear = [&](std::size_t i, const PairAlignment& found) {
     answers[left[i]] = found;
@@ -241,9 +279,6 @@ void AlignVolumesRun::TryAll(const std::vector<Numbers>& tried, AlignStart start
 void AlignVolumesRun::Solve(const Progress& progress)
 {
   const Clock::time_point clock = Clock::now();
-  std::vector<Pose> start;
-  for (const PlacedVolume& volume : volumes_)
-    start.push_back(volume.volumeToWorld);
   std::vector<PoseEdge> edges;
   edges_.clear();
   std::vector<double> voxels;
@@ -266,7 +301,7 @@ void AlignVolumesRun::Solve(const Progress& progress)
   for (const VolumeOutline& outline : outlines_)
     radius += outline.shape.radius / Count();
   graph.radiusMm = std::clamp(radius, 1.0, 10000.0);
-  graph_ = SolvePoseGraph(start, edges, fixed_, graph, progress);
+  graph_ = SolvePoseGraph(Start(), edges, fixed_, graph, progress);
   for (std::size_t e = 0; e < edges.size(); ++e) {
     Attempt& attempt = attempts_[edges_[e]];
     attempt.contested = graph_.isContested[e];
@@ -433,27 +468,24 @@ AlignVolumesPlan AlignVolumesRun::Plan(const Progress& progress)
   AlignVolumesPlan plan;
   plan.seconds = std::exchange(featureSeconds_, 0.0);
   const std::vector<Pose> starts = Start();
-  std::vector<std::pair<Numbers, AlignStart>> left;
+  std::vector<Numbers> pairs; // that are left
   const FirstPairs first = ChooseFirst();
-  const auto ask = [&](const std::vector<Numbers>& pairs, AlignStart start) {
-    for (const Numbers& pair : OrderedForReuse(pairs)) {
+  const auto ask = [&](const std::vector<Numbers>& asked, AlignStart start) {
+    for (const Numbers& pair : OrderedForReuse(asked)) {
       plan.pairs.push_back(pair);
       if (finished_.Find(Ask(pair, start, starts).key))
         ++plan.pairsFinishedBefore;
       else
-        left.push_back({pair, start});
+        pairs.push_back(pair);
     }
   };
   ask(first.sure, p_.pair.start);
   ask(first.near, first.start);
-  std::vector<Numbers> pairs;
-  for (const auto& [pair, start] : left)
-    pairs.push_back(pair);
-  const std::size_t samples = std::min(PlanSamples, left.size());
-  for (std::size_t i = 0; i < samples; ++i) {
-    const auto& [pair, start] = left[(2 * i + 1) * left.size() / (2 * samples)];
-    Answers({pair}, start, starts, progress.Part(0.5 + 0.5 * static_cast<double>(i) / samples, 0.5 + 0.5 * (i + 1.0) / samples));
-  }
+  const std::size_t samples = std::min(std::max(PlanSamples, static_cast<std::size_t>(TasksAtOnce()) / 2), pairs.size());
+  std::vector<Numbers> sampled;
+  for (std::size_t i = 0; i < samples; ++i)
+    sampled.push_back(pairs[(2 * i + 1) * pairs.size() / (2 * samples)]);
+  Answers(sampled, first.near.empty() ? p_.pair.start : first.start, starts, progress.Part(0.5, 1.0));
   plan.budgetBytes = BudgetBytes(p_.resources);
   plan.bytesPerVolume = prepared_.LargestBytes();
   plan.bytesOfAll = plan.bytesPerVolume * Count();
@@ -463,7 +495,7 @@ AlignVolumesPlan AlignVolumesRun::Plan(const Progress& progress)
     plan.secondsPerPair = pairSeconds_ / static_cast<double>(samples);
     plan.secondsPerVolume = featureSeconds_ / std::max(prepared_.TimesMade(), 1);
   }
-  plan.seconds += plan.secondsPerPair * static_cast<double>(left.size()) + plan.secondsPerVolume * plan.timesPrepared;
+  plan.seconds += plan.secondsPerPair * static_cast<double>(pairs.size()) + plan.secondsPerVolume * plan.timesPrepared;
   return plan;
 }
 

@@ -67,7 +67,8 @@ private:
   void ShareOutlines();
   std::vector<Numbers> PairsAt(const std::vector<Pose>& poses, double reachMm) const;
   std::vector<Numbers> PairsWithLandmarks() const;
-  PairAlignment Answer(const Numbers& pair, const Question& question, const Progress& progress);
+  std::vector<PairAlignment> FirstAnswers(const std::vector<Numbers>& pairs, AlignStart start, const std::vector<Pose>& poses,
+                                          const Progress& progress);
   std::vector<PairAlignment> Answers(const std::vector<Numbers>& pairs, AlignStart start, const std::vector<Pose>& poses,
                                      const Progress& progress);
   void Take(const Numbers& pair, const std::vector<Pose>& poses, const PairAlignment& found);

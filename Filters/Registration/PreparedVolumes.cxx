@@ -112,6 +112,13 @@ PreparedVolumes::Made PreparedVolumes::Get(int volume, const Progress& progress)
   return made;
 }
 
+bool PreparedVolumes::HasRoomFor(const std::set<int>& volumes) const
+{
+  const auto have =
+      std::count_if(kept_.begin(), kept_.end(), [&volumes](const Kept& kept) { return volumes.count(kept.volume) > 0; });
+  return bytes_ + (static_cast<double>(volumes.size()) - static_cast<double>(have)) * largestBytes_ <= budgetBytes_;
+}
+
 void PreparedVolumes::MakeRoom(double bytes)
 {
   while (kept_.size() > 1 && bytes_ + bytes > budgetBytes_) {

@@ -7,6 +7,7 @@
 #include <functional>
 #include <list>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -53,8 +54,8 @@ public:
   PreparedVolumes(double budgetBytes, Maker maker) : budgetBytes_(budgetBytes), maker_(std::move(maker)) {}
 
   Made Get(int volume, const Progress& progress = {});
-  /// Whether one more, as large as the largest so far, fits beside all that is kept.
-  bool HasRoom() const { return bytes_ + largestBytes_ <= budgetBytes_; }
+  /// Whether these fit, as large as the largest so far, beside all that is kept, unless they are among that.
+  bool HasRoomFor(const std::set<int>& volumes) const;
 
   int TimesMade() const { return timesMade_; }
   double LargestBytes() const { return largestBytes_; } ///< of one volume

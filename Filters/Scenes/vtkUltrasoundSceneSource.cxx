@@ -242,8 +242,8 @@ void vtkUltrasoundSceneSource::MakeViews(vtkInformationVector* outputs, echorama
   }
   const int first = only > 0 ? only : 1;
   const std::size_t count = only > 0 ? 1 : static_cast<std::size_t>(views);
-  const auto make = [&](std::size_t i, double begin, double end) {
-    const auto at = [&](double part) { return 0.1 + 0.9 * (begin + (end - begin) * part); };
+  const auto make = [&](std::size_t i, std::size_t more, double begin, double end) {
+    const auto at = [&](double part) { return 0.1 + 0.9 * (begin + (end - begin) / static_cast<double>(more) * part); };
     const int number = first + static_cast<int>(i);
     echorama::SceneScan scan = run.Make(static_cast<std::size_t>(number) - 1, progress.Part(at(0.0), at(0.95)));
     SentView view{vtkSmartPointer<vtkMultiBlockDataSet>::New(), {}};
@@ -251,7 +251,7 @@ void vtkUltrasoundSceneSource::MakeViews(vtkInformationVector* outputs, echorama
     scan.beams = {};
     scan.tissue = scan.gelSurface = {};
     view.made.Scan = std::move(scan);
-    return view;
+    return std::vector<SentView>{std::move(view)};
   };
   const auto hear = [&](std::size_t i, const SentView& view) {
     unsigned int place = 0;

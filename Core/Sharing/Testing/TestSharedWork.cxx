@@ -147,15 +147,19 @@ TEST(SharedWork, SharesFollowEachOtherAndAreAlike)
 TEST(SharedWork, ItemsAreSharedOutAndFoundOnce)
 {
   for (const int ranks : {1, 2, 5})
-    for (const std::size_t count : {0, 1, 4, 11}) {
+    for (const std::size_t count : {0, 1, 4, 11, 23}) {
       std::atomic<int> found{0}, heard{0};
       const auto errors = ThreadRanks(ranks).Run([&](SharedWork& shared) {
         const auto all = ShareOut<Square>(
-            shared, count, 2, "squares",
-            [&](std::size_t i, double begin, double end) {
+            shared, count, 4, "squares",
+            [&](std::size_t first, std::size_t most, double begin, double end) {
               EXPECT_LT(begin, end);
-              ++found;
-              return Square{static_cast<int>(i * i), std::string(i, 'a')};
+              EXPECT_LE(end, 1.0);
+              EXPECT_LE(most, 4u);
+              std::vector<Square> some;
+              for (std::size_t i = first; i < first + std::min<std::size_t>(most, 3); ++i, ++found)
+                some.push_back({static_cast<int>(i * i), std::string(i, 'a')});
+              return some;
             },
             [&](std::size_t i, const Square& square) { heard += square.value == static_cast<int>(i * i); });
         ASSERT_EQ(all.size(), count);

@@ -39,14 +39,19 @@ TEST(PreparedVolumes, TheLeastRecentlyUsedGoesFirst)
   EXPECT_EQ(volumes.TimesMade(), 6);
   EXPECT_EQ(volumes.PeakBytes(), 3000.0);
   EXPECT_EQ(volumes.LargestBytes(), 1000.0);
-  EXPECT_FALSE(volumes.HasRoom());
+  EXPECT_TRUE(volumes.HasRoomFor({2, 3})); // they are kept
+  EXPECT_FALSE(volumes.HasRoomFor({2, 4}));
 }
 
 TEST(PreparedVolumes, ALargeOneTakesThePlaceOfSeveral)
 {
   PreparedVolumes volumes(3500.0, [](int v, const Progress&) { return OfSize(v == 9 ? 2000.0 : 1000.0); });
-  for (const int v : {0, 1, 2, 9})
-    volumes.Get(v);
+  volumes.Get(0);
+  volumes.Get(1);
+  EXPECT_TRUE(volumes.HasRoomFor({1, 2}));
+  EXPECT_FALSE(volumes.HasRoomFor({2, 3}));
+  volumes.Get(2);
+  volumes.Get(9);
   volumes.Get(2);
   volumes.Get(9);
   EXPECT_EQ(volumes.TimesMade(), 4);
