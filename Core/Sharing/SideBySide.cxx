@@ -23,6 +23,7 @@ void SideBySide(std::ptrdiff_t count, const Progress& progress,
     if (isOver)
       return;
     try {
+      own(0.0);
       tbb::this_task_arena::isolate([&] { task(i, own); });
       ++done;
     } catch (...) {

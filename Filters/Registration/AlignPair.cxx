@@ -24,15 +24,14 @@
 #include "AlignPair.h"
 #include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/FormatText.h"
 #include "Core/Base/SymmetricMatrix.h"
 #include "Core/Sharing/SideBySide.h"
 #include "Index.h"
 #include "VolumeShape.h"
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <utility>
 
@@ -61,9 +60,7 @@ constexpr double WeakSimilarity = 2.0 * SureSimilarity;
 
 std::string Number(double value, int digits)
 {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.*f", digits, value);
-  return text;
+  return Format("%.*f", digits, value);
 }
 
 // The motion that is least determined, in words.
@@ -76,8 +73,7 @@ std::string LeastDetermined(const Information& covariance, double radius)
   const Eigen::Matrix<double, 6, 1> worst = eigen.vectors.col(5);
   const bool turns = worst.tail<3>().norm() > worst.head<3>().norm();
   const Eigen::Vector3d axis = (turns ? worst.tail<3>() : worst.head<3>()).normalized();
-  return std::string(turns ? "a turn about" : "a move along") + " the direction (" + Number(axis.x(), 2) + ", " +
-         Number(axis.y(), 2) + ", " + Number(axis.z(), 2) + ")";
+  return Format("%s the direction (%.2f, %.2f, %.2f)", turns ? "a turn about" : "a move along", axis.x(), axis.y(), axis.z());
 }
 
 // One search: how far around the start, and how many of its candidates are refined.

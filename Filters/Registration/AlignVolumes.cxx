@@ -6,8 +6,6 @@
 //
 // Ranks share the coarsest resolutions, of which each makes some, and the pairs of a round: each aligns a piece of their order
 // for reuse, so that it prepares few of the volumes. Every rank hears of all that was found and solves the graph itself.
-//
-// Cost: pairs times AlignPair. Which pairs overlap costs next to nothing (OverlappingPairs).
 #include "AlignVolumesRun.h"
 #include "Core/Base/Checksum.h"
 #include "Core/Base/ElapsedTime.h"
@@ -16,7 +14,6 @@
 #include "Core/Sharing/SideBySide.h"
 #include "Index.h"
 #include <algorithm>
-#include <chrono>
 #include <set>
 #include <tuple>
 #include <utility>
@@ -42,14 +39,6 @@ std::string About(const std::vector<std::pair<int, int>>& pairs, const std::vect
 
 } // namespace
 
-PreparedVolumes::Made AlignVolumesRun::Prepare(int v, const Progress& progress)
-{
-  const Clock::time_point start = Clock::now();
-  const auto made = AlignableVolume::Of(sources_[Index(v)], p_.pair.metric, progress);
-  featureSeconds_ += SecondsSince(start);
-  return made;
-}
-
 // All that pairs will ask for is made while there is room, unless they may be known already, or only a plan is wanted.
 void AlignVolumesRun::Outline(int v, bool isPlan, const Progress& progress)
 {
@@ -60,13 +49,12 @@ void AlignVolumesRun::Outline(int v, bool isPlan, const Progress& progress)
     if (source.prepare) {
       const Clock::time_point start = Clock::now();
       resolutions = source.prepare(false, progress);
-      featureSeconds_ += SecondsSince(start);
+      outlineSeconds_ += SecondsSince(start);
       placed.pyramid = &resolutions.pyramid;
     }
   };
   try {
-    const bool mayBeKnown = shared_.Ranks() == 1 ? !finished_.Empty() : !p_.resources.finishedPairs.empty();
-    if (!isPlan && !mayBeKnown && prepared_.HasRoomFor({v})) {
+    if (!isPlan && !MayBeKnown() && prepared_.HasRoomFor({v})) {
       outlines_.emplace_back(prepared_.Get(v, progress)->placed);
       return;
     }
@@ -85,8 +73,19 @@ void AlignVolumesRun::Outline(int v, bool isPlan, const Progress& progress)
 void AlignVolumesRun::OutlineAll(bool isPlan, const Progress& progress)
 {
   const auto [first, last] = shared_.Share(Count());
-  for (auto v = static_cast<int>(first); v < last; ++v)
-    Outline(v, isPlan, progress.Part(static_cast<double>(v - first) / (last - first), (v - first + 1.0) / (last - first)));
+  const auto part = [first = first, last = last, &progress](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    return progress.Part(static_cast<double>(begin - first) / (last - first), static_cast<double>(end - first) / (last - first));
+  };
+  std::set<int> ahead; // made side by side; two first, for nobody knows how large they are
+  for (auto v = static_cast<int>(first); v < last; ++v) {
+    if (ahead.count(v) == 0 && !isPlan && !MayBeKnown()) {
+      const auto end = std::min<std::ptrdiff_t>(last, v + (ahead.empty() ? 2 : TasksAtOnce()));
+      for (int next = v; next < end; ++next)
+        ahead.insert(next);
+      prepared_.MakeAhead({ahead.find(v), ahead.end()}, part(v, end));
+    }
+    Outline(v, isPlan, part(v + 1, v + 1));
+  }
   if (shared_.Ranks() > 1)
     ShareOutlines();
   const auto trouble = std::find_if(troubles_.rbegin(), troubles_.rend(), [](const std::string& text) { return !text.empty(); });
@@ -170,32 +169,31 @@ std::vector<PairAlignment> AlignVolumesRun::FirstAnswers(const std::vector<Numbe
       answers[i].reason = error.what();
     }
   };
-  for (std::size_t i = 0; i < std::min(pairs.size(), static_cast<std::size_t>(TasksAtOnce())); ++i) {
-    const auto [a, b] = pairs[i];
+  for (std::size_t i = 0; i < std::min(pairs.size(), Index(TasksAtOnce())); ++i) {
+    const int a = pairs[i].first, b = pairs[i].second;
     if (i > 0 && !prepared_.HasRoomFor({a, b}))
       break;
     questions.push_back(Ask(pairs[i], start, poses));
     made.emplace_back();
     answers.emplace_back();
-    attempt(i, [&, a = a, b = b] {
-      made[i] = {prepared_.Get(a, progress.Part(0.0, 0.0)), prepared_.Get(b, progress.Part(0.0, 0.0))};
-    });
+    attempt(i, [&] { made[i] = {prepared_.Get(a, progress.Part(0.0, 0.0)), prepared_.Get(b, progress.Part(0.0, 0.0))}; });
   }
   const Clock::time_point clock = Clock::now();
+  const double share = static_cast<double>(questions.size()) / static_cast<double>(pairs.size());
   std::vector<char> isDone(questions.size(), 0);
-  const auto align = [&](std::ptrdiff_t task, const Progress& part) {
-    const auto i = static_cast<std::size_t>(task);
-    const auto& [fixed, moving] = made[i];
-    if (moving)
-      attempt(i, [&, fixed = fixed, moving = moving] {
-        answers[i] = aligner_(fixed->At(questions[i].fixed.volumeToWorld), fixed->features,
-                              moving->At(questions[i].moving.volumeToWorld), moving->features, questions[i].parameters, part);
-      });
-    isDone[i] = 1;
-  };
   try {
-    const auto count = static_cast<std::ptrdiff_t>(questions.size());
-    SideBySide(count, progress.Part(0.0, static_cast<double>(count) / static_cast<double>(pairs.size())), align);
+    SideBySide(static_cast<std::ptrdiff_t>(questions.size()), progress.Part(0.0, share),
+               [&](std::ptrdiff_t task, const Progress& part) {
+                 const auto i = Index(task);
+                 const auto &fixed = made[i].first, &moving = made[i].second;
+                 if (moving)
+                   attempt(i, [&] {
+                     answers[i] =
+                         aligner_(fixed->At(questions[i].fixed.volumeToWorld), fixed->features,
+                                  moving->At(questions[i].moving.volumeToWorld), moving->features, questions[i].parameters, part);
+                   });
+                 isDone[i] = 1;
+               });
   } catch (...) {
     for (std::size_t i = 0; i < questions.size(); ++i)
       if (isDone[i] != 0)
@@ -466,7 +464,7 @@ AlignVolumesPlan AlignVolumesRun::Plan(const Progress& progress)
 {
   OutlineAll(true, progress.Part(0.0, 0.5));
   AlignVolumesPlan plan;
-  plan.seconds = std::exchange(featureSeconds_, 0.0);
+  plan.seconds = std::exchange(outlineSeconds_, 0.0);
   const std::vector<Pose> starts = Start();
   std::vector<Numbers> pairs; // that are left
   const FirstPairs first = ChooseFirst();
@@ -481,7 +479,7 @@ AlignVolumesPlan AlignVolumesRun::Plan(const Progress& progress)
   };
   ask(first.sure, p_.pair.start);
   ask(first.near, first.start);
-  const std::size_t samples = std::min(std::max(PlanSamples, static_cast<std::size_t>(TasksAtOnce()) / 2), pairs.size());
+  const std::size_t samples = std::min(std::max(PlanSamples, Index(TasksAtOnce()) / 2), pairs.size());
   std::vector<Numbers> sampled;
   for (std::size_t i = 0; i < samples; ++i)
     sampled.push_back(pairs[(2 * i + 1) * pairs.size() / (2 * samples)]);
@@ -493,7 +491,7 @@ AlignVolumesPlan AlignVolumesRun::Plan(const Progress& progress)
       TimesMade(pairs, plan.bytesPerVolume > 0.0 ? static_cast<int>(std::min(plan.budgetBytes / plan.bytesPerVolume, 1e9)) : 0);
   if (samples > 0) {
     plan.secondsPerPair = pairSeconds_ / static_cast<double>(samples);
-    plan.secondsPerVolume = featureSeconds_ / std::max(prepared_.TimesMade(), 1);
+    plan.secondsPerVolume = prepared_.Seconds() / std::max(prepared_.TimesMade(), 1);
   }
   plan.seconds += plan.secondsPerPair * static_cast<double>(pairs.size()) + plan.secondsPerVolume * plan.timesPrepared;
   return plan;

@@ -1,22 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "AlignVolumesRun.h"
+#include "Core/Base/FormatText.h"
 #include "Core/Base/JoinedSets.h"
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 namespace echorama {
-namespace {
-
-std::string Millimetres(double mm)
-{
-  char text[64];
-  std::snprintf(text, sizeof text, "%.1f mm", mm);
-  return text;
-}
-
-} // namespace
-
 Information Turned(const Information& information, const Eigen::Matrix3d& rotation)
 {
   Information turn = Information::Zero();
@@ -43,7 +32,7 @@ std::string AlignVolumesRun::WhyDoubtful(int v) const
     return "its pose depends on an ambiguous pair alone: " + unsure;
   if (count > 0)
     return std::string(count == 1 ? "the pair " : "the pairs ") + contested + (count == 1 ? " disagrees" : " disagree") +
-           " with the others by " + Millimetres(residual) + ", and as many pairs support it as contradict it";
+           " with the others by " + Format("%.1f mm", residual) + ", and as many pairs support it as contradict it";
   return "volumes between it and " + volumes_[Index(fixed_)].name + " are placed by ambiguous pairs only";
 }
 
@@ -70,7 +59,7 @@ std::string AlignVolumesRun::WhyFailed(int v) const
 AlignVolumesResult AlignVolumesRun::Report() const
 {
   AlignVolumesResult result;
-  result.featureSeconds = featureSeconds_;
+  result.featureSeconds = outlineSeconds_ + prepared_.Seconds();
   result.pairSeconds = pairSeconds_;
   result.graphSeconds = graphSeconds_;
   result.timesPrepared = prepared_.TimesMade();
@@ -111,14 +100,14 @@ AlignVolumesResult AlignVolumesRun::Report() const
     const auto edge = std::lower_bound(edges_.begin(), edges_.end(), numbers); // they are in the attempts' order
     const bool isEdge = edge != edges_.end() && *edge == numbers;
     if (!isEdge && attempt.votedDown)
-      pair.reason = "it disagreed with the other pairs by " + Millimetres(pair.residualMm) +
+      pair.reason = "it disagreed with the other pairs by " + Format("%.1f mm", pair.residualMm) +
                     "; aligned again from where they place it: " + own.reason;
     if (isEdge) {
       const std::size_t e = Index(static_cast<int>(edge - edges_.begin()));
       pair.stands = !graph_.isWrong[e];
       if (!attempt.votedDown)
         pair.residualMm = graph_.residualMm[e];
-      const std::string disagrees = "it disagrees with the other pairs by " + Millimetres(pair.residualMm);
+      const std::string disagrees = "it disagrees with the other pairs by " + Format("%.1f mm", pair.residualMm);
       if (graph_.isContested[e]) {
         pair.verdict = Verdict::Ambiguous;
         pair.reason = disagrees + ", but as many pairs speak for it as against it";
@@ -126,7 +115,7 @@ AlignVolumesResult AlignVolumesRun::Report() const
         pair.verdict = Verdict::Failed;
         pair.reason = disagrees + (own.reason.empty() ? "" : "; by itself: " + own.reason);
       } else if (attempt.votedDown) {
-        pair.reason = "it disagreed with the other pairs by " + Millimetres(pair.residualMm) +
+        pair.reason = "it disagreed with the other pairs by " + Format("%.1f mm", pair.residualMm) +
                       "; aligned again from where they place it, it agrees";
       } else if (own.verdict == Verdict::Ambiguous && !graph_.isBridge[e]) {
         pair.verdict = Verdict::Aligned;
@@ -197,12 +186,12 @@ void AlignVolumesRun::StateErrors(AlignVolumesResult& result) const
     if (volume.verdict == Verdict::Aligned && !isClear[Index(v)] && openMm > p_.pair.maximumErrorVoxels * voxelsMm[Index(v)]) {
       volume.verdict = Verdict::Ambiguous;
       volume.reason =
-          "the image contents do not determine its pose: by all pairs together it may be off by " + Millimetres(openMm);
+          "the image contents do not determine its pose: by all pairs together it may be off by " + Format("%.1f mm", openMm);
     }
     if (volume.verdict == Verdict::Aligned && volume.errorMm > p_.pair.maximumErrorMm) {
       volume.verdict = Verdict::Ambiguous;
       volume.reason =
-          "it may be off by " + Millimetres(volume.errorMm) + ", and at most " + Millimetres(p_.pair.maximumErrorMm) +
+          "it may be off by " + Format("%.1f mm", volume.errorMm) + ", and at most " + Format("%.1f mm", p_.pair.maximumErrorMm) +
           " are accepted" +
           (bentMm > 0.5 * volume.errorMm
                ? "; most of it is what the speed of sound may have bent over the distance to " + volumes_[Index(fixed_)].name

@@ -18,8 +18,9 @@ public:
   AlignVolumesRun(const std::vector<VolumeOnDemand>& volumes, int fixed, const AlignVolumesParameters& p,
                   const PairAligner& aligner)
     : sources_(volumes), fixed_(fixed), p_(p), aligner_(aligner), shared_(p.shared ? *p.shared : alone_),
-      prepared_(BudgetBytes(p.resources) / (p.resources.memoryGb > 0.0 ? 1 : shared_.Ranks()), // they may be on one machine
-                [this](int v, const Progress& progress) { return Prepare(v, progress); }),
+      prepared_(
+          BudgetBytes(p.resources) / (p.resources.memoryGb > 0.0 ? 1 : shared_.Ranks()), // they may be on one machine
+          [this](int v, const Progress& progress) { return AlignableVolume::Of(sources_[Index(v)], p_.pair.metric, progress); }),
       finished_(shared_.Rank() == 0 ? p.resources.finishedPairs : ""), troubles_(volumes.size()), held_(volumes.size(), false)
   {
     for (const VolumeOnDemand& volume : volumes)
@@ -61,7 +62,8 @@ private:
   bool IsPair(int a, int b) const { return CanBeAligned(a) && CanBeAligned(b) && !(IsHeld(a) && IsHeld(b)); }
   Numbers Ordered(int a, int b) const { return IsHeld(b) || (!IsHeld(a) && b < a) ? Numbers(b, a) : Numbers(a, b); }
 
-  PreparedVolumes::Made Prepare(int v, const Progress& progress);
+  // Whether pairs may have been aligned before, so that not all volumes will be asked for.
+  bool MayBeKnown() const { return shared_.Ranks() == 1 ? !finished_.Empty() : !p_.resources.finishedPairs.empty(); }
   void Outline(int v, bool isPlan, const Progress& progress);
   void OutlineAll(bool isPlan, const Progress& progress);
   void ShareOutlines();
@@ -103,7 +105,7 @@ private:
   std::map<Numbers, Attempt> attempts_;
   std::vector<Numbers> edges_; // of the graph, as last solved
   PoseGraphResult graph_;
-  double featureSeconds_ = 0.0, pairSeconds_ = 0.0, graphSeconds_ = 0.0;
+  double outlineSeconds_ = 0.0, pairSeconds_ = 0.0, graphSeconds_ = 0.0;
 };
 
 /// A motion's information in other axes.

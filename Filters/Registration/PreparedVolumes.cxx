@@ -2,7 +2,10 @@
 // The order of pairs is that of Cuthill and McKee (1969): volumes are numbered outwards from one at the rim of what overlaps, so
 // that those which overlap have numbers close to each other. Of a sweep in rows about two rows need to be kept.
 #include "PreparedVolumes.h"
+#include "Core/Base/ElapsedTime.h"
+#include "Core/Base/Error.h"
 #include "Core/Base/Memory.h"
+#include "Core/Sharing/SideBySide.h"
 #include "Index.h"
 #include "Metric.h"
 #include <algorithm>
@@ -95,28 +98,55 @@ double AlignableVolume::Bytes() const
 
 PreparedVolumes::Made PreparedVolumes::Get(int volume, const Progress& progress)
 {
-  const auto found = std::find_if(kept_.begin(), kept_.end(), [volume](const Kept& kept) { return kept.volume == volume; });
-  if (found != kept_.end()) {
-    kept_.splice(kept_.begin(), kept_, found);
-    return kept_.front().made;
+  if (Find(volume) == kept_.end()) {
+    MakeRoom(largestBytes_); // before it is made, so that the budget holds meanwhile
+    Make({volume}, true, progress);
   }
-  MakeRoom(largestBytes_); // before it is made, so that the budget holds meanwhile
-  const Made made = maker_(volume, progress);
-  ++timesMade_;
-  const double bytes = made->Bytes();
-  MakeRoom(bytes);
-  kept_.push_front({volume, made, bytes});
-  bytes_ += bytes;
-  largestBytes_ = std::max(largestBytes_, bytes);
-  peakBytes_ = std::max(peakBytes_, bytes_);
-  return made;
+  kept_.splice(kept_.begin(), kept_, Find(volume));
+  return kept_.front().made;
 }
 
-bool PreparedVolumes::HasRoomFor(const std::set<int>& volumes) const
+void PreparedVolumes::MakeAhead(const std::set<int>& volumes, const Progress& progress)
 {
-  const auto have =
-      std::count_if(kept_.begin(), kept_.end(), [&volumes](const Kept& kept) { return volumes.count(kept.volume) > 0; });
-  return bytes_ + (static_cast<double>(volumes.size()) - static_cast<double>(have)) * largestBytes_ <= budgetBytes_;
+  if (HasRoomFor(volumes))
+    Make(Missing(volumes), false, progress);
+}
+
+std::list<PreparedVolumes::Kept>::iterator PreparedVolumes::Find(int volume)
+{
+  return std::find_if(kept_.begin(), kept_.end(), [volume](const Kept& kept) { return kept.volume == volume; });
+}
+
+std::vector<int> PreparedVolumes::Missing(const std::set<int>& volumes)
+{
+  std::vector<int> missing;
+  std::copy_if(volumes.begin(), volumes.end(), std::back_inserter(missing), [this](int v) { return Find(v) == kept_.end(); });
+  return missing;
+}
+
+void PreparedVolumes::Make(const std::vector<int>& volumes, bool isAsked, const Progress& progress)
+{
+  const Clock::time_point start = Clock::now();
+  std::vector<Made> made(volumes.size());
+  SideBySide(static_cast<std::ptrdiff_t>(volumes.size()), progress, [&](std::ptrdiff_t i, const Progress& part) {
+    try {
+      made[Index(i)] = maker_(volumes[Index(i)], part);
+    } catch (const Error& error) {
+      if (isAsked || error.GetKind() == Error::Kind::Cancelled)
+        throw;
+    }
+  });
+  seconds_ += SecondsSince(start);
+  for (std::size_t i = 0; i < made.size(); ++i)
+    if (made[i]) {
+      ++timesMade_;
+      const double bytes = made[i]->Bytes();
+      MakeRoom(bytes);
+      kept_.push_front({volumes[i], made[i], bytes});
+      bytes_ += bytes;
+      largestBytes_ = std::max(largestBytes_, bytes);
+      peakBytes_ = std::max(peakBytes_, bytes_);
+    }
 }
 
 void PreparedVolumes::MakeRoom(double bytes)

@@ -54,8 +54,12 @@ public:
   PreparedVolumes(double budgetBytes, Maker maker) : budgetBytes_(budgetBytes), maker_(std::move(maker)) {}
 
   Made Get(int volume, const Progress& progress = {});
+  /// Makes those of \a volumes that are not kept side by side, if all have room. One that cannot be made is left to whoever asks
+  /// for it.
+  void MakeAhead(const std::set<int>& volumes, const Progress& progress = {});
   /// Whether these fit, as large as the largest so far, beside all that is kept, unless they are among that.
-  bool HasRoomFor(const std::set<int>& volumes) const;
+  bool HasRoomFor(const std::set<int>& volumes) { return bytes_ + Missing(volumes).size() * largestBytes_ <= budgetBytes_; }
+  double Seconds() const { return seconds_; } ///< by the clock, while volumes were made
 
   int TimesMade() const { return timesMade_; }
   double LargestBytes() const { return largestBytes_; } ///< of one volume
@@ -67,12 +71,15 @@ private:
     Made made;
     double bytes;
   };
+  std::list<Kept>::iterator Find(int volume);
+  std::vector<int> Missing(const std::set<int>& volumes);
+  void Make(const std::vector<int>& volumes, bool isAsked, const Progress& progress);
   void MakeRoom(double bytes);
 
   const double budgetBytes_;
   const Maker maker_;
   std::list<Kept> kept_; // the last asked for first
-  double bytes_ = 0.0, largestBytes_ = 0.0, peakBytes_ = 0.0;
+  double bytes_ = 0.0, largestBytes_ = 0.0, peakBytes_ = 0.0, seconds_ = 0.0;
   int timesMade_ = 0;
 };
 

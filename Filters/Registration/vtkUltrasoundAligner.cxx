@@ -59,8 +59,7 @@ std::string ContentOf(const vtkUltrasoundVolume::Input& volume, bool withReliabi
     if (vtkDataArray* array = volume.Image->GetFieldData()->GetArray(name)) {
       std::vector<double> values;
       for (vtkIdType i = 0; i < array->GetNumberOfValues(); ++i)
-        values.push_back(
-            array->GetComponent(i / array->GetNumberOfComponents(), static_cast<int>(i % array->GetNumberOfComponents())));
+        values.push_back(array->GetVariantValue(i).ToDouble());
       add(values);
     }
   return content;
@@ -242,39 +241,34 @@ int vtkUltrasoundAligner::GetNumberOfVolumes() const
 //----------------------------------------------------------------------------
 bool vtkUltrasoundAligner::GetPose(int volume, vtkMatrix4x4* pose) const
 {
-  const auto* result = this->ResultOf(volume);
-  if (result) {
+  if (const auto* result = this->ResultOf(volume)) {
     vtkUltrasoundVolume::SetMatrix(pose, result->volumeToWorld);
   }
-  return result != nullptr;
+  return this->ResultOf(volume) != nullptr;
 }
 
 //----------------------------------------------------------------------------
 double vtkUltrasoundAligner::GetOverlap(int volume) const
 {
-  const auto* result = this->ResultOf(volume);
-  return result ? result->overlap : 0.0;
+  return this->ResultOf(volume) ? this->ResultOf(volume)->overlap : 0.0;
 }
 
 //----------------------------------------------------------------------------
 double vtkUltrasoundAligner::GetSimilarity(int volume) const
 {
-  const auto* result = this->ResultOf(volume);
-  return result ? result->similarity : 0.0;
+  return this->ResultOf(volume) ? this->ResultOf(volume)->similarity : 0.0;
 }
 
 //----------------------------------------------------------------------------
 std::string vtkUltrasoundAligner::GetVerdict(int volume) const
 {
-  const auto* result = this->ResultOf(volume);
-  return result ? echorama::NameOf(result->verdict) : std::string();
+  return this->ResultOf(volume) ? echorama::NameOf(this->ResultOf(volume)->verdict) : std::string();
 }
 
 //----------------------------------------------------------------------------
 std::string vtkUltrasoundAligner::GetReason(int volume) const
 {
-  const auto* result = this->ResultOf(volume);
-  return result ? result->reason : std::string();
+  return this->ResultOf(volume) ? this->ResultOf(volume)->reason : std::string();
 }
 
 //----------------------------------------------------------------------------

@@ -136,9 +136,9 @@ std::vector<echorama::LandmarkList> vtkUltrasoundLandmarkError::Lists(vtkInforma
     }
     lists.push_back(std::move(list));
   }
-  std::vector<std::string> names;
-  for (const echorama::LandmarkList& list : lists) {
-    names.push_back(aligned.empty() ? "" : list.name);
+  std::vector<std::string> names(lists.size());
+  for (std::size_t i = 0; i < aligned.size(); ++i) {
+    names[i] = lists[i].name;
   }
   const auto fields = vtkUltrasoundDisplacement::FieldsOf(inputs[1], names);
   for (std::size_t i = 0; i < fields.size(); ++i) {
@@ -199,12 +199,11 @@ void vtkUltrasoundLandmarkError::PutOut(vtkInformation* out) const
     }
     output->GetPointData()->SetVectors(errors);
   }
-  const echorama::LandmarkError& found = this->Found;
-  vtkUltrasoundVolume::AddField(output, "Mean", &found.mean, 1);
-  vtkUltrasoundVolume::AddField(output, "Rms", &found.rms, 1);
-  vtkUltrasoundVolume::AddField(output, "Median", &found.median, 1);
-  vtkUltrasoundVolume::AddField(output, "Percentile95", &found.percentile95, 1);
-  vtkUltrasoundVolume::AddField(output, "Max", &found.max, 1);
+  using Of = echorama::LandmarkError;
+  for (const auto& [name, number] : {std::pair("Mean", &Of::mean), std::pair("Rms", &Of::rms), std::pair("Median", &Of::median),
+                                     std::pair("Percentile95", &Of::percentile95), std::pair("Max", &Of::max)}) {
+    vtkUltrasoundVolume::AddField(output, name, &(this->Found.*number), 1);
+  }
   output->GetFieldData()->AddArray(unmatched);
   output->GetFieldData()->AddArray(lone);
 }

@@ -3,6 +3,8 @@
 #include "Filters/Registration/Metric.h"
 #include "Filters/Registration/PreparedVolumes.h"
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <gtest/gtest.h>
 #include <map>
 
@@ -58,6 +60,29 @@ TEST(PreparedVolumes, ALargeOneTakesThePlaceOfSeveral)
   EXPECT_EQ(volumes.PeakBytes(), 3000.0);
   volumes.Get(1);
   EXPECT_EQ(volumes.TimesMade(), 5);
+}
+
+TEST(PreparedVolumes, AreMadeAheadWhereThereIsRoom)
+{
+  std::array<std::atomic<int>, 6> times{};
+  PreparedVolumes volumes(4500.0, [&times](int v, const Progress&) {
+    ++times[static_cast<std::size_t>(v)];
+    if (v == 2)
+      throw Error(Error::Kind::BadInput, "volume 2 is empty");
+    return OfSize(1000.0);
+  });
+  const auto timesMade = [&times] { return std::vector<int>(times.begin(), times.end()); };
+  volumes.Get(1);
+  volumes.MakeAhead({0, 1, 2, 3}); // 2 cannot be made, which is not asked here
+  EXPECT_EQ(timesMade(), (std::vector<int>{1, 1, 1, 1, 0, 0}));
+  EXPECT_EQ(volumes.TimesMade(), 3);
+  for (const int v : {0, 1, 3})
+    volumes.Get(v);
+  EXPECT_EQ(volumes.TimesMade(), 3);
+  EXPECT_THROW(volumes.Get(2), Error);
+  volumes.MakeAhead({4, 5}); // no room for both
+  EXPECT_EQ(timesMade(), (std::vector<int>{1, 1, 2, 1, 0, 0}));
+  EXPECT_THROW(volumes.MakeAhead({3, 4}, Progress([](double) { return false; })), Error);
 }
 
 TEST(PreparedVolumes, TwoAreKeptWhateverTheBudget)
