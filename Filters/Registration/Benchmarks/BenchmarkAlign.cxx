@@ -18,6 +18,7 @@
 //   BenchmarkAlign [TRIALS [CASE...]]     default: 8 of each case: near far liver; and on request: anywhere
 #include "Core/Base/Random.h"
 #include "Core/Imaging/ValidPoints.h"
+#include "Core/Sharing/SideBySide.h"
 #include "Filters/Phantoms/Phantom.h"
 #include "Filters/Phantoms/PhantomViews.h"
 #include "Filters/Registration/AlignmentScore.h"
@@ -29,6 +30,7 @@
 #include "Testing/Benchmark.h"
 #include "Testing/ElastixPeer.h"
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -120,10 +122,16 @@ Answer Ours(const BenchmarkPair& pair, const Pose& start)
   const double before = benchmark::CpuSeconds();
   const double seconds = benchmark::Seconds([&] {
     const AlignPairParameters parameters;
-    const PreparedVolume pa = PrepareVolume(pair.a.Posed(), true), pb = PrepareVolume(pair.b.Posed(start), true);
-    const PlacedVolume a{&pa.pyramid, Pose::Identity(), "A", &pa.reliability},
-        b{&pb.pyramid, Pose::Identity(), "B", &pb.reliability};
-    found = AlignPair(a, BuildMetricPyramid(a, parameters.metric), b, BuildMetricPyramid(b, parameters.metric), parameters);
+    std::array<PreparedVolume, 2> prepared;
+    std::array<PlacedVolume, 2> placed;
+    std::array<std::shared_ptr<const MetricPyramid>, 2> features;
+    SideBySide(2, {}, [&](std::ptrdiff_t i, const Progress&) { // as AlignVolumes does
+      const auto v = static_cast<std::size_t>(i);
+      prepared[v] = PrepareVolume(v == 0 ? pair.a.Posed() : pair.b.Posed(start), true);
+      placed[v] = {&prepared[v].pyramid, Pose::Identity(), v == 0 ? "A" : "B", &prepared[v].reliability};
+      features[v] = BuildMetricPyramid(placed[v], parameters.metric);
+    });
+    found = AlignPair(placed[0], features[0], placed[1], features[1], parameters);
   });
   return {found.volumeToWorld, found.verdict == Verdict::Aligned, seconds, benchmark::CpuSeconds() - before};
 }
