@@ -2,6 +2,7 @@
 // The one place that knows which file holds which format. Each format lies in a file of its own.
 #include "Readers/VolumeSource.h"
 #include "Core/Base/Error.h"
+#include "Readers/CoarseVolume.h"
 #include "Readers/DicomFile.h"
 #include "Readers/ImageStackFile.h"
 #include "Readers/KretzFile.h"
@@ -33,10 +34,17 @@ ParameterList Describe(VolumeReadParameters& p)
           "Spacing of a stack of pictures: along x, along y and from picture to picture. Where it is 0, that of the files is "
           "taken, else 1 mm, with a note. Other formats know theirs.")
           .Advanced(),
+      Parameter(
+          "Stride", p.stride, {1, 1000}, "voxels",
+          "Only one of so many voxels along each axis is read, for a first look at a large volume; those between are skipped. "
+          "Not for VTK image files (.vti).")
+          .Advanced(),
   };
 }
 
-std::unique_ptr<VolumeSource> OpenVolume(const std::string& path, const VolumeReadParameters& parameters)
+namespace {
+
+std::unique_ptr<VolumeSource> OpenWhole(const std::string& path, const VolumeReadParameters& parameters)
 {
   switch (FormatOfContent(path)) {
   case FileFormat::MetaImage:
@@ -55,6 +63,15 @@ std::unique_ptr<VolumeSource> OpenVolume(const std::string& path, const VolumeRe
   default:
     throw Error(Error::Kind::BadFile, path + ": the content is none of " + KnownFormats());
   }
+}
+
+} // namespace
+
+std::unique_ptr<VolumeSource> OpenVolume(const std::string& path, const VolumeReadParameters& parameters)
+{
+  CheckRanges(parameters);
+  std::unique_ptr<VolumeSource> whole = OpenWhole(path, parameters);
+  return parameters.stride > 1 ? CoarseVolume(std::move(whole), parameters.stride) : std::move(whole);
 }
 
 } // namespace echorama

@@ -82,6 +82,7 @@ protected:
 struct VolumeReadParameters {
   double spacingMm = 0.0;
   Eigen::Vector3d stackSpacingMm = Eigen::Vector3d::Zero();
+  int stride = 1;
 };
 ParameterList Describe(VolumeReadParameters& p);
 

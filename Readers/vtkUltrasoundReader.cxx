@@ -67,9 +67,11 @@ echorama::ImageGeometry BeamGrid(const echorama::BeamContent& beams)
 }
 
 std::unique_ptr<VolumeSource> OpenCompanion(const std::string& path, const std::string& companion,
-                                            const echorama::ImageGeometry& geometry)
+                                            const echorama::ImageGeometry& geometry, int stride)
 {
-  auto source = echorama::OpenVolume(companion);
+  echorama::VolumeReadParameters parameters;
+  parameters.stride = stride;
+  auto source = echorama::OpenVolume(companion, parameters);
   if (!source->Content().geometry.AgreesWith(geometry)) {
     throw Error(Error::Kind::BadFile, companion + ": its geometry is not that of " + path +
                                           "; remove it if it belongs to an earlier file of this name");
@@ -78,7 +80,7 @@ std::unique_ptr<VolumeSource> OpenCompanion(const std::string& path, const std::
 }
 
 // The file NAME.array.ext beside NAME.ext, with the same geometry as the volume, or nullptr when there is none.
-vtkSmartPointer<vtkDataArray> ReadCompanion(const std::string& path, const char* array, vtkImageData* volume,
+vtkSmartPointer<vtkDataArray> ReadCompanion(const std::string& path, const char* array, vtkImageData* volume, int stride,
                                             const echorama::Progress& progress)
 {
   const std::string companion = echorama::CompanionPath(path, array);
@@ -86,7 +88,7 @@ vtkSmartPointer<vtkDataArray> ReadCompanion(const std::string& path, const char*
   if (!std::filesystem::exists(companion, ignored)) {
     return nullptr;
   }
-  const auto source = OpenCompanion(path, companion, vtkUltrasoundVolume::GeometryOf(volume));
+  const auto source = OpenCompanion(path, companion, vtkUltrasoundVolume::GeometryOf(volume), stride);
   CheckRoom(source->Content());
   auto values = NewArray(source->Content().type, source->Content().geometry.VoxelCount(), array);
   source->Read(0, values->GetVoidPointer(0), nullptr, progress);
@@ -279,6 +281,9 @@ int vtkUltrasoundReader::RequestInformation(vtkInformation*, vtkInformationVecto
     const int nothing[6] = {0, -1, 0, -1, 0, -1};
     beams->Set(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), nothing, 6);
     if (echorama::FormatOfContent(path) == FileFormat::VtkXmlImage) {
+      if (this->Values.stride > 1) {
+        throw Error(Error::Kind::InvalidParameter, path + ": Stride must be 1 for VTK image files, which are read as a whole");
+      }
       const vtkNew<vtkXMLImageDataReader> reader;
       std::vector<std::string> unused;
       vtkUltrasoundVolume::SetGeometry(out, OpenXml(reader, path, unused));
@@ -397,7 +402,7 @@ bool vtkUltrasoundReader::ReadSlices(vtkImageData* output, const echorama::Progr
     for (const char* name : names) {
       const std::string companion = echorama::CompanionPath(path, name);
       if (std::filesystem::exists(companion, ignored)) {
-        opened->Beside.emplace_back(name, OpenCompanion(path, companion, opened->Main->Content().geometry));
+        opened->Beside.emplace_back(name, OpenCompanion(path, companion, opened->Main->Content().geometry, this->Values.stride));
       }
     }
     const bool all =
@@ -568,7 +573,7 @@ void vtkUltrasoundReader::FindValidRegion(vtkImageData* output, const echorama::
     throw Error(Error::Kind::BadFile, std::string(this->FileName) + ": its ValidRegion is not one number per voxel");
   }
   if (!found) {
-    found = ReadCompanion(this->FileName, vtkUltrasoundVolume::ValidRegionName(), output, progress);
+    found = ReadCompanion(this->FileName, vtkUltrasoundVolume::ValidRegionName(), output, this->Values.stride, progress);
   }
   if (found) {
     arrays->AddArray(AsValidRegion(found));
@@ -595,7 +600,7 @@ void vtkUltrasoundReader::FindCompanions(vtkImageData* output, const echorama::P
 {
   for (const char* name : echorama::CompanionArrays) {
     if (!output->GetPointData()->GetArray(name)) {
-      if (const auto array = ReadCompanion(this->FileName, name, output, progress)) {
+      if (const auto array = ReadCompanion(this->FileName, name, output, this->Values.stride, progress)) {
         output->GetPointData()->AddArray(array);
       }
     }

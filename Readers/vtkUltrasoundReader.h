@@ -89,6 +89,12 @@ public:
   vtkUltrasoundVectorMacro(StackSpacingMm);
 
   /**
+   * Only one of so many voxels along each axis is read, for a first look at a large volume; those between are skipped. Not for
+   * VTK image files (.vti). In [1, 1000] voxels; default 1.
+   */
+  vtkUltrasoundIntegerMacro(Stride);
+
+  /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
    * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What `echorama align` and `echorama stitch` cost for many volumes: a probe is swept over invented tissue in rows of 32, 23% of its
 width further with each view and 47% with each row, and what a tracker said of each view is some 3 mm and 2 degrees off. For 10 to 1,000
-volumes of 128^3, and 10 of 32^3 to 256^3: seconds, memory and error, as rows of tables, and the line through the counts.
+volumes of one size, and 10 of 32^3 to 256^3: seconds, memory and error, as rows of tables, and the line through the counts.
 
-    python3 Testing/many_volumes.py build/release/bin/echorama FOLDER [--counts 10 32 100 320 1000] [--edges 32 64 128 256]
+    python3 Testing/many_volumes.py build/release/bin/echorama FOLDER [--counts 10 32 100 320 1000] [--edge 128] [--edges 32 64 128 256]
 
 FOLDER gets the volumes and the results; some 3 GB, which may be removed afterwards.
 """
@@ -158,11 +158,12 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("program")
     parser.add_argument("folder", type=pathlib.Path)
-    parser.add_argument("--counts", type=int, nargs="*", default=[10, 32, 100, 320, 1000], help="numbers of volumes of 128^3")
+    parser.add_argument("--counts", type=int, nargs="*", default=[10, 32, 100, 320, 1000], help="numbers of volumes")
+    parser.add_argument("--edge", type=int, default=128, help="voxels along an edge of those")
     parser.add_argument("--edges", type=int, nargs="*", default=[32, 64, 128, 256], help="voxels along an edge, of ten volumes each")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
-    wanted = [(edge, 10) for edge in options.edges] + [(128, count) for count in options.counts]
+    wanted = [(edge, 10) for edge in options.edges] + [(options.edge, count) for count in options.counts]
     tasks = sorted({(file_of(options.folder, edge, number), number, edge) for edge, count in wanted for number in range(count)})
     with multiprocessing.Pool() as pool:
         for done, _ in enumerate(pool.imap_unordered(make, tasks), 1):
@@ -171,7 +172,7 @@ def main():
     print("| " + " | ".join(HEAD) + " |\n" + "| --- " * len(HEAD) + "|")
     for edge in options.edges:
         cost(options.program, options.folder, edge, 10)
-    costs = [cost(options.program, options.folder, 128, count) for count in options.counts]
+    costs = [cost(options.program, options.folder, options.edge, count) for count in options.counts]
     if len(costs) > 1:
         extrapolate(options.counts, costs)
 

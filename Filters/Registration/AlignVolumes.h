@@ -7,7 +7,7 @@
 
 namespace echorama {
 
-/// What aligns two volumes; AlignPair unless another is given.
+/// What aligns two volumes; AlignPair unless another is given. It is called on several threads at once.
 using PairAligner = std::function<PairAlignment(
     const PlacedVolume& fixed, const std::shared_ptr<const MetricPyramid>& fixedFeatures, const PlacedVolume& moving,
     const std::shared_ptr<const MetricPyramid>& movingFeatures, const AlignPairParameters& parameters, const Progress& progress)>;

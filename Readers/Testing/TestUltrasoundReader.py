@@ -200,6 +200,27 @@ class Reader(unittest.TestCase):
         self.assertIn("memory", " ".join(self.errors))
         self.assertEqual(whole.GetOutput().GetNumberOfPoints(), 0)
 
+    def test_stride_reads_one_of_so_many_voxels_along_each_axis(self):
+        random = np.random.default_rng(3)
+        voxels = random.integers(1, 256, (12, 5, 6)).astype(np.uint8)
+        valid = random.integers(0, 2, voxels.shape).astype(np.uint8)
+        path = self.put("a.mha", meta(voxels.tobytes(), "6 5 12", spacing="0.5 1 2"))
+        self.put("a.ValidRegion.mha", meta(valid.tobytes(), "6 5 12", spacing="0.5 1 2"))
+        reader = self.reader(path)
+        reader.SetStride(4)
+        reader.Update()
+        self.assertEqual(self.errors, [])
+        coarse = reader.GetOutput()
+        self.assertEqual(coarse.GetDimensions(), (2, 2, 3))
+        self.assertEqual(coarse.GetSpacing(), (2, 4, 8))
+        self.assertIn("one of 4 voxels along each axis was read", reader.GetNotes())
+        for name, whole in (("Intensity", voxels), ("ValidRegion", valid)):
+            found = vtk_to_numpy(coarse.GetPointData().GetArray(name)).reshape(3, 2, 2)
+            np.testing.assert_array_equal(found, whole[::4, ::4, ::4])
+        reader.SetFileName(self.put("a.vti", vti("1 2 0 1 0 1", "2 1 1", "0 -1 0 1 0 0 0 0 1")))
+        reader.Update()
+        self.assertIn("Stride", " ".join(self.errors))
+
     def test_a_file_that_changes_between_slices_is_opened_anew(self):
         for name in ("a.mha", "a.ValidRegion.mha"):
             path = self.put(name, meta(zlib.compress(bytes(range(1, 9))), "2 1 4", more="CompressedData = True\n"))

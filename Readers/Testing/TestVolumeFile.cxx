@@ -294,11 +294,31 @@ TEST_F(VolumeFile, SlicesAreThoseOfTheWhole)
           << first << " " << count;
       EXPECT_EQ(part.back(), 4711);
     }
+    // One of three along each axis: x 0, 3, 6; y 0, 3; z 0, 3, 6, 9.
+    VolumeReadParameters coarsely;
+    coarsely.stride = 3;
+    const auto coarse = OpenVolume(Path(name), coarsely);
+    const ImageGeometry& geometry = coarse->Content().geometry;
+    EXPECT_EQ(geometry.dimensions, (std::array<int, 3>{3, 2, 4}));
+    const Eigen::Vector3d last(2, 1, 3);
+    EXPECT_LT((geometry.IndexToWorld() * last - source->Content().geometry.IndexToWorld() * (3.0 * last)).norm(), 1e-12);
+    std::vector<std::uint16_t> wanted, found(24), some(12);
+    for (std::size_t k = 0; k < 11; k += 3)
+      for (std::size_t j = 0; j < 5; j += 3)
+        for (std::size_t i = 0; i < 7; i += 3)
+          wanted.push_back(whole[(k * 5 + j) * 7 + i]);
+    coarse->Read(0, found.data(), nullptr);
+    EXPECT_EQ(found, wanted);
+    coarse->ReadSlices(1, 2, some.data());
+    EXPECT_TRUE(std::equal(some.begin(), some.end(), wanted.begin() + 6));
   }
   Put("text.nrrd", "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 1 1 2\nencoding: ascii\n\n1 2\n");
   const auto text = OpenVolume(Path("text.nrrd"));
   EXPECT_FALSE(text->ReadsSlices());
   EXPECT_THROW(text->ReadSlices(0, 1, nullptr), Error);
+  VolumeReadParameters coarsely;
+  coarsely.stride = 2;
+  ExpectRefused([&] { OpenVolume(Path("text.nrrd"), coarsely); }, Error::Kind::NotPossible, Path("text.nrrd"), "Stride");
 }
 
 TEST_F(VolumeFile, AFullDiskLeavesWhatWasThere)

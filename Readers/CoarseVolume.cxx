@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "Readers/CoarseVolume.h"
+#include "Core/Base/NumberText.h"
+#include <cstring>
+#include <utility>
+#include <vector>
+
+namespace echorama {
+namespace {
+
+class Coarse : public VolumeSource {
+public:
+  Coarse(std::unique_ptr<VolumeSource> whole, int stride)
+    : VolumeSource(whole->Content().path, whole->Content().format), whole_(std::move(whole)), stride_(stride)
+  {
+    content_ = whole_->Content();
+    for (int& n : content_.geometry.dimensions)
+      n = (n + stride - 1) / stride;
+    content_.geometry.spacing *= stride;
+    Note("one of " + NumberText(stride) + " voxels along each axis was read");
+  }
+
+  void Read(std::size_t, void* voxels, unsigned char*, const Progress& progress) override
+  {
+    ReadSlices(0, content_.geometry.dimensions[2], voxels, progress);
+  }
+
+  bool ReadsSlices() const override { return true; }
+
+  void ReadSlices(int first, int count, void* voxels, const Progress& progress) override
+  {
+    const auto &n = content_.geometry.dimensions, &all = whole_->Content().geometry.dimensions;
+    const std::size_t size = SizeOf(content_.type), stride = static_cast<std::size_t>(stride_),
+                      row = static_cast<std::size_t>(all[0]) * size;
+    std::vector<unsigned char> slice(row * static_cast<std::size_t>(all[1]));
+    auto* to = static_cast<unsigned char*>(voxels);
+    for (int k = 0; k < count; ++k) {
+      progress(static_cast<double>(k) / count);
+      whole_->ReadSlices((first + k) * stride_, 1, slice.data());
+      for (std::size_t j = 0; j < static_cast<std::size_t>(n[1]); ++j)
+        for (std::size_t i = 0; i < static_cast<std::size_t>(n[0]); ++i, to += size)
+          std::memcpy(to, &slice[(j * row + i * size) * stride], size);
+    }
+  }
+
+private:
+  const std::unique_ptr<VolumeSource> whole_;
+  const int stride_;
+};
+
+} // namespace
+
+std::unique_ptr<VolumeSource> CoarseVolume(std::unique_ptr<VolumeSource> whole, int stride)
+{
+  if (!whole->ReadsSlices())
+    throw Error(Error::Kind::NotPossible,
+                whole->Content().path +
+                    ": Stride must be 1, for this file cannot be read slice by slice (MetaImage, NRRD and NIfTI can)");
+  return std::make_unique<Coarse>(std::move(whole), stride);
+}
+
+} // namespace echorama
