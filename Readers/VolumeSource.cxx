@@ -69,7 +69,7 @@ std::unique_ptr<VolumeSource> OpenWhole(const std::string& path, const VolumeRea
 
 std::unique_ptr<VolumeSource> OpenVolume(const std::string& path, const VolumeReadParameters& parameters)
 {
-  CheckRanges(parameters);
+  CheckRanges(parameters, path);
   std::unique_ptr<VolumeSource> whole = OpenWhole(path, parameters);
   return parameters.stride > 1 ? CoarseVolume(std::move(whole), parameters.stride) : std::move(whole);
 }
