@@ -95,6 +95,15 @@ class Volumes(unittest.TestCase):
         numpy.testing.assert_array_equal(read, voxels)
         self.assertEqual([float(n) for n in header["ElementSpacing"].split()], [0.25, 0.5, 2])
 
+    def test_stride(self):
+        voxels = blobs((5, 6, 7))
+        write_mha(work / "large.mha", voxels)
+        run_json("convert", work / "large.mha", work / "coarse.mha", "--stride", 3)
+        header, read = read_mha(work / "coarse.mha")
+        numpy.testing.assert_array_equal(read, voxels[::3, ::3, ::3])
+        spacing = [float(n) for n in read_mha(work / "large.mha")[0]["ElementSpacing"].split()]
+        numpy.testing.assert_allclose([float(n) for n in header["ElementSpacing"].split()], [3 * n for n in spacing])
+
     def test_header(self):
         write_mha(work / "fields.mha", blobs((5, 6, 7)), header={"Operator": "nobody", "Comment": "x" * 200})
         told = run_json("info", work / "fields.mha")["files"][0]["fields"]

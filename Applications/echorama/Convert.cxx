@@ -130,9 +130,10 @@ void Convert(Session& session, const ConvertOptions& options)
   const FileKind kind = KindOf(options.input);
   if (kind != FileKind::Sequence && !options.frames.empty())
     Misused("--frames: " + options.input + " is no tracked sequence");
-  if (kind != FileKind::Volume && (options.reading.parameters.spacingMm > 0.0 || options.reading.step > 0 ||
-                                   options.reading.beams || !options.reading.parameters.stackSpacingMm.isZero(0.0)))
-    Misused("--time, --beams, --spacing and --stack-spacing: " + options.input + " is no volume");
+  if (kind != FileKind::Volume &&
+      (options.reading.parameters.spacingMm > 0.0 || options.reading.step > 0 || options.reading.beams ||
+       !options.reading.parameters.stackSpacingMm.isZero(0.0) || options.reading.parameters.stride > 1))
+    Misused("--time, --beams, --spacing, --stack-spacing and --stride: " + options.input + " is no volume");
   switch (kind) {
   case FileKind::Volume:
     return ConvertVolume(session, options);
@@ -162,6 +163,7 @@ void EchoramaCommand(CLI::App* options, Action& action)
                     "Write the samples along beams that the file holds, not their scan conversion");
   AddParameter(options, Describe(values->reading.parameters), "SpacingMm", "--spacing");
   AddParameter(options, Describe(values->reading.parameters), "StackSpacingMm", "--stack-spacing");
+  AddParameter(options, Describe(values->reading.parameters), "Stride", "--stride");
   options->add_option("--frames", values->frames,
                       "Frames of a sequence, from 0: a list of single ones and FROM:TO:STEP, both included");
   action = [values](Session& session) { Convert(session, *values); };

@@ -10,6 +10,7 @@
 #include "Core/Imaging/ValidPoints.h"
 #include "Display.h"
 #include "Filters/Embedding/Feather.h"
+#include "ParameterOptions.h"
 #include "Readers/OutputFiles.h"
 #include "Volumes.h"
 #include <array>
@@ -39,6 +40,7 @@ namespace echorama {
 namespace {
 
 struct ViewOptions {
+  VolumeReading reading;
   std::vector<std::string> files;
   std::string poses, screenshot;
   std::vector<int> size{1200, 900};
@@ -507,7 +509,7 @@ void View(Session& session, ViewOptions options)
   if (!options.screenshot.empty())
     CheckOutput(options.screenshot, inputs);
   CheckDisplay();
-  std::vector<LoadedVolume> volumes = LoadVolumes(session, options.files);
+  std::vector<LoadedVolume> volumes = LoadVolumes(session, options.files, options.reading);
   ApplyPoses(session, volumes, options.poses);
   session.result["files"] = options.files;
 
@@ -539,6 +541,7 @@ void EchoramaCommand(CLI::App* options, Action& action)
 {
   auto values = std::make_shared<ViewOptions>();
   options->add_option("file", values->files, "Volumes of any format")->type_name("VOLUME")->required();
+  AddParameter(options, Describe(values->reading.parameters), "Stride", "--stride");
   options->add_option("--poses", values->poses, "Pose file that says where the volumes belong")->type_name("FILE");
   options->add_option("--screenshot", values->screenshot, "Write a picture to this PNG file instead of opening a window")
       ->type_name("FILE");

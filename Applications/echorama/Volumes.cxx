@@ -29,6 +29,7 @@ LoadedVolume LoadVolume(Session& session, const std::string& file, const VolumeR
   reader->SetFileName(file.c_str());
   reader->SetSpacingMm(reading.parameters.spacingMm);
   reader->SetStackSpacingMm(reading.parameters.stackSpacingMm.data());
+  reader->SetStride(reading.parameters.stride);
   LoadedVolume volume;
   volume.file = file;
   volume.content.format = FormatOfContent(file);
@@ -58,11 +59,11 @@ LoadedVolume LoadVolume(Session& session, const std::string& file, const VolumeR
   return volume;
 }
 
-std::vector<LoadedVolume> LoadVolumes(Session& session, const std::vector<std::string>& files)
+std::vector<LoadedVolume> LoadVolumes(Session& session, const std::vector<std::string>& files, const VolumeReading& reading)
 {
   std::vector<LoadedVolume> volumes;
   for (const std::string& file : files)
-    volumes.push_back(LoadVolume(session, file));
+    volumes.push_back(LoadVolume(session, file, reading));
   return volumes;
 }
 

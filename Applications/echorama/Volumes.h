@@ -30,7 +30,7 @@ struct VolumeReading {
 
 /// Reads a volume. Throws Error that names the file.
 LoadedVolume LoadVolume(Session&, const std::string& file, const VolumeReading& reading = {});
-std::vector<LoadedVolume> LoadVolumes(Session&, const std::vector<std::string>& files);
+std::vector<LoadedVolume> LoadVolumes(Session&, const std::vector<std::string>& files, const VolumeReading& reading = {});
 
 /// The volumes among \a files: NAME.ValidRegion.EXT and its like, which a shell's * finds too, belong to NAME.EXT
 /// and are left out, with a note, when that is there.
