@@ -37,7 +37,7 @@ ParameterList Describe(VolumeReadParameters& p)
       Parameter(
           "Stride", p.stride, {1, 1000}, "voxels",
           "Only one of so many voxels along each axis is read, for a first look at a large volume; those between are skipped. "
-          "Not for VTK image files (.vti).")
+          "For MetaImage, NRRD and NIfTI.")
           .Advanced(),
   };
 }

@@ -89,8 +89,8 @@ public:
   vtkUltrasoundVectorMacro(StackSpacingMm);
 
   /**
-   * Only one of so many voxels along each axis is read, for a first look at a large volume; those between are skipped. Not for
-   * VTK image files (.vti). In [1, 1000] voxels; default 1.
+   * Only one of so many voxels along each axis is read, for a first look at a large volume; those between are skipped. For
+   * MetaImage, NRRD and NIfTI. In [1, 1000] voxels; default 1.
    */
   vtkUltrasoundIntegerMacro(Stride);
 

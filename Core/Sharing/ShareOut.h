@@ -25,8 +25,8 @@ std::vector<T> ShareOut(SharedWork& shared, std::size_t count, std::size_t atOnc
     };
     Packed mine;
     const auto [first, last] = shared.Share(items);
-    const auto part = [first = first, all = static_cast<double>(last - first)](std::ptrdiff_t i) {
-      return static_cast<double>(i - first) / all;
+    const auto part = [first = first, last = last](std::ptrdiff_t i) {
+      return static_cast<double>(i - first) / static_cast<double>(last - first);
     };
     for (auto [i, end] = pieceOf(shared.Rank()); i < end;)
       for (T& found : find(static_cast<std::size_t>(i), static_cast<std::size_t>(end - i), part(i), part(end))) {

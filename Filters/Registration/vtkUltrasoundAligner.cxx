@@ -58,8 +58,8 @@ std::string ContentOf(const vtkUltrasoundVolume::Input& volume, bool withReliabi
   for (const char* name : {vtkUltrasoundAcquisition::ProbeGeometryName(), vtkUltrasoundAcquisition::ProbeToWorldName()})
     if (vtkDataArray* array = volume.Image->GetFieldData()->GetArray(name)) {
       std::vector<double> values;
-      for (vtkIdType i = 0; i < array->GetNumberOfValues(); ++i)
-        values.push_back(array->GetVariantValue(i).ToDouble());
+      for (vtkIdType i = 0; i < array->GetNumberOfTuples(); ++i)
+        values.insert(values.end(), array->GetTuple(i), array->GetTuple(i) + array->GetNumberOfComponents());
       add(values);
     }
   return content;

@@ -19,7 +19,6 @@
 #include "Testing/Benchmark.h"
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <ctime>
 #include <tuple>
 
