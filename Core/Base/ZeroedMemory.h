@@ -11,18 +11,6 @@
 
 namespace echorama {
 
-// An address sanitizer sees past the end of what malloc gave, not of what mmap did.
-#if defined(__SANITIZE_ADDRESS__)
-#define ECHORAMA_HUGE_PAGES 0
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define ECHORAMA_HUGE_PAGES 0
-#endif
-#endif
-#if !defined(ECHORAMA_HUGE_PAGES) && defined(__linux__)
-#define ECHORAMA_HUGE_PAGES 1
-#endif
-
 /// Memory of arrays of numbers that begin with zeros: large ones lie on huge pages where the system has them (a fault of a page
 /// costs as much as a pass over it, and a huge page is 512 of them), and nobody writes the zeros, so that each thread brings in
 /// the pages that it is the first to write to.
@@ -38,7 +26,7 @@ public:
   T* allocate(std::size_t count)
   {
     void* memory = nullptr;
-#if ECHORAMA_HUGE_PAGES
+#ifdef __linux__
     if (const std::size_t bytes = Bytes(count); bytes >= Large) {
       // As much as is needed, from the beginning of a huge page on.
       void* all = mmap(nullptr, bytes + HugePage, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -60,7 +48,7 @@ public:
   }
   void deallocate(T* memory, std::size_t count)
   {
-#if ECHORAMA_HUGE_PAGES
+#ifdef __linux__
     if (const std::size_t bytes = Bytes(count); bytes >= Large) {
       munmap(memory, bytes);
       return;

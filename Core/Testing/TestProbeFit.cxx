@@ -128,11 +128,7 @@ using NamedProbe = std::pair<const char*, ProbeGeometry>;
 // All of them; under the sanitizers the first two.
 std::vector<NamedProbe> Chosen(const std::vector<NamedProbe>& probes)
 {
-#ifdef ECHORAMA_SANITIZED
-  return {probes[0], probes[1]};
-#else
-  return probes;
-#endif
+  return IsSanitized() ? std::vector<NamedProbe>{probes[0], probes[1]} : probes;
 }
 
 const std::vector<NamedProbe> planes{

@@ -461,9 +461,8 @@ TEST(OpenIgtLink, TheListenerTakesWhatSeveralPeersPush)
 
 TEST(OpenIgtLink, TheListenerDoesNotSpinWhenThereAreNoDescriptors)
 {
-#ifdef ECHORAMA_SANITIZED
-  GTEST_SKIP() << "the sanitizers need descriptors of their own to look at objects";
-#endif
+  if (IsSanitized())
+    GTEST_SKIP() << "the sanitizers need descriptors of their own to look at objects";
   PoseStream poses;
   OpenIgtLinkListener listener(TrackerAddress::Parse("igtl-listen://:0"));
   listener.Start(poses, nullptr);

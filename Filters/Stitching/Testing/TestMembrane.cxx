@@ -249,11 +249,7 @@ TEST(Membrane, BoundHoldsOnAnyShape)
 {
   const std::array<int, 3> sizes[] = {{13, 11, 12}, {16, 16, 16}, {31, 23, 1}, {1, 17, 19}, {23, 1, 16}, {40, 3, 5}, {7, 29, 2}};
   int solved = 0;
-#ifdef ECHORAMA_SANITIZED
-  const int rounds = 1;
-#else
-  const int rounds = 9;
-#endif
+  const int rounds = IsSanitized() ? 1 : 9;
   for (int round = 0; round < rounds; ++round)
     for (std::size_t n = 0; n < std::size(sizes); ++n) {
       const std::uint64_t seed = static_cast<std::uint64_t>(round) * 16 + n;
