@@ -9,10 +9,12 @@ volumes of one size, and 10 of 32^3 to 256^3: seconds, memory and error, as rows
 FOLDER gets the volumes and the results; some 3 GB, which may be removed afterwards.
 """
 import argparse
+import collections
 import json
 import multiprocessing
 import os
 import pathlib
+import re
 import subprocess
 import time
 
@@ -139,6 +141,9 @@ def cost(program, folder, edge, count):
            f"{right:,}", f"{farthest:.2f}", f"{neighbours:.3f}", f"{stitching[0]:.3g}", f"{stitching[1]:.3g}", f"{stitching[2]:.2f}",
            f"{voxels / 1e6:,.2g}"]
     print("| " + " | ".join(row) + " |", flush=True)
+    reasons = collections.Counter(re.sub(r"\d[\d_.]*", "N", volume["reason"])[:200] for volume in told["volumes"] if volume["verdict"] != "aligned")
+    for reason, times in reasons.most_common(5):
+        print(f"{times} of them not aligned: {reason}", flush=True)
     return {"processor seconds of align": aligned[1], "GB of align": aligned[2], "processor seconds of stitch": stitching[1], "GB of stitch": stitching[2]}
 
 

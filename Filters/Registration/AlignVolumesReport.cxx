@@ -6,13 +6,6 @@
 #include <cmath>
 
 namespace echorama {
-Information Turned(const Information& information, const Eigen::Matrix3d& rotation)
-{
-  Information turn = Information::Zero();
-  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = rotation;
-  return turn * information * turn.transpose();
-}
-
 std::string AlignVolumesRun::WhyDoubtful(int v) const
 {
   std::string contested, unsure;
@@ -99,9 +92,10 @@ AlignVolumesResult AlignVolumesRun::Report() const
     pair.residualMm = attempt.residualMm;
     const auto edge = std::lower_bound(edges_.begin(), edges_.end(), numbers); // they are in the attempts' order
     const bool isEdge = edge != edges_.end() && *edge == numbers;
+    const std::string again = "it disagreed with the other pairs by " + Format("%.1f mm", pair.residualMm) +
+                              "; aligned again from where they place it"; // if it was voted down
     if (!isEdge && attempt.votedDown)
-      pair.reason = "it disagreed with the other pairs by " + Format("%.1f mm", pair.residualMm) +
-                    "; aligned again from where they place it: " + own.reason;
+      pair.reason = again + ": " + own.reason;
     if (isEdge) {
       const std::size_t e = Index(static_cast<int>(edge - edges_.begin()));
       pair.stands = !graph_.isWrong[e];
@@ -115,8 +109,7 @@ AlignVolumesResult AlignVolumesRun::Report() const
         pair.verdict = Verdict::Failed;
         pair.reason = disagrees + (own.reason.empty() ? "" : "; by itself: " + own.reason);
       } else if (attempt.votedDown) {
-        pair.reason = "it disagreed with the other pairs by " + Format("%.1f mm", pair.residualMm) +
-                      "; aligned again from where they place it, it agrees";
+        pair.reason = again + ", it agrees";
       } else if (own.verdict == Verdict::Ambiguous && !graph_.isBridge[e]) {
         pair.verdict = Verdict::Aligned;
         pair.reason = "the other pairs agree with it; by itself: " + own.reason;

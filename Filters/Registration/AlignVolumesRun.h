@@ -108,7 +108,4 @@ private:
   double outlineSeconds_ = 0.0, pairSeconds_ = 0.0, graphSeconds_ = 0.0;
 };
 
-/// A motion's information in other axes.
-Information Turned(const Information& information, const Eigen::Matrix3d& rotation);
-
 } // namespace echorama

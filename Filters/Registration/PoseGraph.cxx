@@ -291,7 +291,8 @@ void Graph::StartFromBestTree(const Flags& take, const Flags& keep)
   const int trees = std::min(p_.trees, std::max(10, static_cast<int>(TreeEdgesAtMost / std::max(1.0, taken))));
   std::vector<double> best(volumes, -1.0); // per root
   std::vector<Pose> bestPoses = poses;
-  for (int t = 0; t < trees; ++t) {
+  bool isUnanimous = false;
+  for (int t = 0; t < trees && !isUnanimous; ++t) {
     std::vector<double> lengths(edges_.size(), 0.0);
     Random random(p_.seed, static_cast<std::uint64_t>(t));
     for (std::size_t e = 0; e < edges_.size(); ++e) {
@@ -302,7 +303,7 @@ void Graph::StartFromBestTree(const Flags& take, const Flags& keep)
     }
     const Tree tree = GrowTree(take, isRoot, lengths, t % 2 == 0);
     std::vector<double> votes(volumes, 0.0);
-    bool isUnanimous = true;
+    isUnanimous = true;
     for (std::size_t e = 0; e < edges_.size(); ++e) {
       if (!take[e])
         continue;
@@ -325,8 +326,6 @@ void Graph::StartFromBestTree(const Flags& take, const Flags& keep)
         bestPoses[v] = tree.poses[v];
     for (std::size_t v = 0; v < volumes; ++v)
       best[v] = std::max(best[v], votes[v]);
-    if (isUnanimous)
-      break;
   }
   poses = bestPoses;
 }
@@ -593,7 +592,7 @@ ParameterList Describe(PoseGraphParameters& p)
                 "Nor are edges that disagree by less of their own."),
       Parameter("LossSigmas", p.lossSigmas, {0, 1000, true}, "standard deviations", "Scale of the robust (Cauchy) loss."),
       Parameter("UndeterminedMm", p.undeterminedMm, {0, 1000, true}, "mm",
-                "A volume with a larger standard deviation in some direction is not determined."),
+                "A volume with a larger standard deviation in some direction beside its neighbours is not determined."),
       Parameter("Trees", p.trees, {1, 100000}, "", "Spanning trees that are tried as starts, at most."),
   };
 }
@@ -666,24 +665,24 @@ PoseGraphResult SolvePoseGraph(const std::vector<Pose>& start, const std::vector
   result.consistency = freedom > 0 ? std::sqrt(chiSquare / freedom) : 0.0;
 
   const MarginalCovariances covariances(weighed, graph.stands, none, graph.IsRoot(graph.stands), graph.poses);
-  Twist scale;
-  scale << 1.0, 1.0, 1.0, p.radiusMm, p.radiusMm, p.radiusMm;
-  Information turn = Information::Zero();
-  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = start[Index(fixed)].linear();
-  for (std::size_t v = 0; v < volumes; ++v) {
-    const int number = static_cast<int>(v);
-    result.centre.push_back(start[Index(fixed)] * covariances.Centre(number));
-    if (number == fixed || !result.isPlaced[v]) {
-      result.isDetermined[v] = number == fixed;
+  const Twist scale = (Twist() << 1.0, 1.0, 1.0, p.radiusMm, p.radiusMm, p.radiusMm).finished();
+  const double doubt = std::max(1.0, result.consistency); // edges that disagree more than they claim are less sure of it
+  const auto axes = [&](const Information& covariance) {
+    return EigenOfSymmetric(Information(scale.asDiagonal() * (doubt * doubt * covariance) * scale.asDiagonal()));
+  };
+  // By edges that leave no direction open; what adds up along many of them is an error, and no open direction.
+  JoinedSets<int> determined(volumes);
+  for (std::size_t e = 0; e < count; ++e)
+    if (graph.stands[e] && std::sqrt(axes(covariances.OfEdge(e)).values.maxCoeff()) <= p.undeterminedMm)
+      determined.Join(edges[e].from, edges[e].to);
+  for (int v = 0; v < static_cast<int>(volumes); ++v) {
+    result.centre.push_back(start[Index(fixed)] * covariances.Centre(v));
+    result.isDetermined[Index(v)] = determined.Of(v) == determined.Of(fixed);
+    if (v == fixed || !result.isPlaced[Index(v)])
       continue;
-    }
-    // Edges that disagree more than they claim are less sure than they claim.
-    const Information covariance = covariances.OfVolume(number) * std::max(1.0, result.consistency * result.consistency);
-    const Information alike = scale.asDiagonal() * covariance * scale.asDiagonal();
-    const SymmetricEigen solver = EigenOfSymmetric(alike);
-    result.isDetermined[v] = std::sqrt(solver.values.maxCoeff()) <= p.undeterminedMm;
+    const SymmetricEigen solver = axes(covariances.OfVolume(v));
     const Information inverse = solver.vectors * solver.values.cwiseInverse().asDiagonal() * solver.vectors.transpose();
-    result.information[v] = turn * (scale.asDiagonal() * inverse * scale.asDiagonal()) * turn.transpose();
+    result.information[Index(v)] = Turned(scale.asDiagonal() * inverse * scale.asDiagonal(), start[Index(fixed)].linear());
   }
   progress(1.0);
   return result;

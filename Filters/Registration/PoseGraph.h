@@ -11,6 +11,9 @@ namespace echorama {
 /// An inverse covariance of (translation mm, rotation vector radians).
 using Information = Eigen::Matrix<double, 6, 6>;
 
+/// A motion's information in other axes.
+Information Turned(const Information& information, const Eigen::Matrix3d& rotation);
+
 /// How one volume was measured to lie against another.
 struct PoseEdge {
   int from = 0, to = 0;             ///< volumes, not the same
@@ -43,9 +46,10 @@ struct PoseGraphResult {
   std::vector<double> residualMm;     ///< per edge: how far it disagrees with the result, root mean square at the radius
   std::vector<double> residualSigmas; ///< per edge: the same in its standard deviations (Mahalanobis)
 
-  std::vector<bool> isPlaced;     ///< per volume: joined to the fixed one by edges that stand
-  std::vector<bool> isDoubtful;   ///< per volume: placed, but only through edges that are unverified or contested
-  std::vector<bool> isDetermined; ///< per volume: placed, and no direction of its pose is left open
+  std::vector<bool> isPlaced;   ///< per volume: joined to the fixed one by edges that stand
+  std::vector<bool> isDoubtful; ///< per volume: placed, but only through edges that are unverified or contested
+  std::vector<bool>
+      isDetermined; ///< per volume: placed, and no direction of its pose is left open (a long way of sure edges leaves none)
   /// Per volume: inverse covariance of MotionAbout(centre, rotation, translation) * volumeToWorld relative to the fixed volume.
   std::vector<Information> information;
   std::vector<Eigen::Vector3d> centre; ///< per volume, world: about which its information speaks

@@ -161,6 +161,13 @@ void MinimiseDisagreement(const std::vector<WeighedEdge>& edges, const std::vect
   }
 }
 
+Information Turned(const Information& information, const Eigen::Matrix3d& rotation)
+{
+  Information turn = Information::Zero();
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = rotation;
+  return turn * information * turn.transpose();
+}
+
 MarginalCovariances::MarginalCovariances(const std::vector<WeighedEdge>& edges, const std::vector<bool>& isUsed,
                                          const std::vector<bool>& isAsked, const std::vector<bool>& isFixed,
                                          const std::vector<Pose>& poses)

@@ -437,6 +437,22 @@ TEST(PoseGraph, SaysWhatIsNotDetermined)
   EXPECT_TRUE(AllFinite(SolvePoseGraph(world.starts, {sphere, sphere}, 0)));
 }
 
+// What small errors add up to along many sure edges may be more than what is left of an open direction.
+TEST(PoseGraph, ALongWayOfSureEdgesLeavesNoDirectionOpen)
+{
+  constexpr int count = 400;
+  World world(count, 10);
+  std::vector<PoseEdge> edges;
+  for (int v = 1; v < count; ++v)
+    edges.push_back(world.Exact(v - 1, v));
+  edges.back().information.bottomRightCorner<3, 3>().setZero(); // as of a sphere
+  const PoseGraphResult result = SolvePoseGraph(world.starts, edges, 0);
+  const Information covariance = result.information[count - 2].inverse();
+  EXPECT_GT(std::sqrt(covariance.topLeftCorner<3, 3>().trace()), 3.0 * PoseGraphParameters().undeterminedMm);
+  EXPECT_EQ(std::count(result.isDetermined.begin(), result.isDetermined.end(), true), count - 1);
+  EXPECT_FALSE(result.isDetermined[count - 1]);
+}
+
 TEST(PoseGraph, LimitsOfTheLoss)
 {
   World world(10, 11);
