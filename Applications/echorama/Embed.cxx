@@ -9,10 +9,14 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <vtkInformation.h>
+#include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkSmartPointer.h>
+#include <vtkStreamingDemandDrivenPipeline.h>
 #include <vtkUltrasoundAcquisition.h>
 #include <vtkUltrasoundEmbedder.h>
+#include <vtkUltrasoundReader.h>
 #include <vtkUltrasoundVolume.h>
 
 namespace echorama {
@@ -23,48 +27,35 @@ struct EmbedOptions {
   std::vector<std::string> noise;
 };
 
-void Embed(Session& session, const EmbedOptions& options, vtkUltrasoundEmbedder* embedder)
+using LabelCounts = std::array<std::ptrdiff_t, 4>;
+
+void CountLabels(vtkImageData* image, LabelCounts& voxels)
 {
-  std::vector<std::string> inputs{options.file};
-  inputs.insert(inputs.end(), options.noise.begin(), options.noise.end());
-  if (!options.form.empty())
-    inputs.push_back(options.form);
-  CheckVolumeOutput(options.output, inputs);
+  if (vtkDataArray* labels = image->GetPointData()->GetArray(vtkUltrasoundVolume::EmbeddingName()))
+    for (const unsigned char label : vtkUltrasoundVolume::ViewOf<const unsigned char>(labels, image))
+      ++voxels[label];
+}
 
-  const LoadedVolume volume = LoadVolume(session, options.file);
-  const std::vector<LoadedVolume> noise = LoadVolumes(session, WithoutCompanions(session, options.noise));
-  LoadedVolume form;
-  embedder->SetInputData(0, volume.image);
-  if (!noise.empty())
-    embedder->SetInputData(1, BlocksOf(noise));
-  if (!options.form.empty()) {
-    form = LoadVolume(session, options.form);
-    embedder->SetInputData(2, form.image);
-  }
-  try {
-    session.Update(embedder, "embed", options.file);
-  } catch (const Error& error) { // the filter knows no files, but for the names of noise volumes
-    const std::string reason = error.what(), subject = "the form";
-    const bool named = std::any_of(noise.begin(), noise.end(),
-                                   [&reason](const LoadedVolume& each) { return reason.find(each.file) != std::string::npos; });
-    if (error.GetKind() == Error::Kind::Cancelled || named)
-      throw;
-    if (reason.rfind(subject, 0) == 0)
-      throw Error(error.GetKind(), options.form + reason.substr(subject.size()));
-    throw Error(error.GetKind(), options.file + ": " + reason);
-  }
-  vtkImageData* result = embedder->GetOutput();
+// The filter knows no files, but for the names of noise volumes.
+[[noreturn]] void Fail(const Error& error, const EmbedOptions& options, const std::vector<LoadedVolume>& noise)
+{
+  const std::string reason = error.what(), subject = "the form";
+  const bool named = std::any_of(noise.begin(), noise.end(),
+                                 [&reason](const LoadedVolume& each) { return reason.find(each.file) != std::string::npos; });
+  if (error.GetKind() == Error::Kind::Cancelled || named || reason.find(options.file) != std::string::npos)
+    throw error;
+  if (reason.rfind(subject, 0) == 0)
+    throw Error(error.GetKind(), options.form + reason.substr(subject.size()));
+  throw Error(error.GetKind(), options.file + ": " + reason);
+}
 
-  std::array<std::ptrdiff_t, 4> voxels{};
-  for (const unsigned char label : vtkUltrasoundVolume::ViewOf<const unsigned char>(
-           result->GetPointData()->GetArray(vtkUltrasoundVolume::EmbeddingName()), result))
-    ++voxels[label];
+// What came out, of which \a image is all or a part.
+void Tell(Session& session, const EmbedOptions& options, vtkUltrasoundEmbedder* embedder, vtkImageData* image,
+          const ImageGeometry& geometry, const LabelCounts& voxels, const std::vector<std::string>& lost)
+{
   const auto count = [&voxels](EmbeddedVoxel kind) { return voxels[static_cast<std::size_t>(kind)]; };
-  const std::vector<std::string> lost = SaveVolume(session, result, options.output);
-
-  const ImageGeometry geometry = vtkUltrasoundVolume::GeometryOf(result);
-  const auto probe = vtkUltrasoundAcquisition::ProbeGeometryOf(result);
-  const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(result);
+  const auto probe = vtkUltrasoundAcquisition::ProbeGeometryOf(image);
+  const auto pose = vtkUltrasoundAcquisition::ProbeToWorldOf(image);
   session.result["file"] = options.file;
   session.result["output"] = options.output;
   session.result["lost"] = lost;
@@ -96,6 +87,70 @@ void Embed(Session& session, const EmbedOptions& options, vtkUltrasoundEmbedder*
     session.Say("  " + line);
 }
 
+// A volume that is larger than the memory: read, embedded and written slab by slab.
+void EmbedLarge(Session& session, const EmbedOptions& options, vtkUltrasoundEmbedder* embedder)
+{
+  if (!IsWrittenBySlabs(options.output))
+    throw Error(Error::Kind::TooLarge,
+                options.output + ": embedding " + options.file +
+                    " needs more memory than is free or allowed (--memory), and its format is written whole; "
+                    "as .mha, .nrrd or .nii it would be made slab by slab");
+  session.Watch(embedder, "plan", options.file, [&] { embedder->UpdateInformation(); });
+  const int slabs = embedder->GetSlabs();
+  session.Note("the result is larger than the memory that is allowed: it is made and written in " + std::to_string(slabs) +
+               " slabs");
+  LabelCounts voxels{};
+  vtkSmartPointer<vtkImageData> last;
+  WriteBySlabs(session, embedder, slabs, options.output, "embed", [&](vtkImageData* slab) {
+    CountLabels(slab, voxels);
+    last = slab;
+  });
+  ImageGeometry geometry = vtkUltrasoundVolume::GeometryOf(last);
+  int whole[6];
+  embedder->GetOutputInformation(0)->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), whole);
+  embedder->GetOutputInformation(0)->Get(vtkDataObject::ORIGIN(), geometry.origin.data());
+  geometry.dimensions = {whole[1] + 1, whole[3] + 1, whole[5] + 1};
+  session.result["slabs"] = slabs;
+  Tell(session, options, embedder, last, geometry, voxels, {});
+}
+
+void Embed(Session& session, const EmbedOptions& options, vtkUltrasoundEmbedder* embedder)
+{
+  std::vector<std::string> inputs{options.file};
+  inputs.insert(inputs.end(), options.noise.begin(), options.noise.end());
+  if (!options.form.empty())
+    inputs.push_back(options.form);
+  CheckVolumeOutput(options.output, inputs);
+
+  const std::vector<LoadedVolume> noise = LoadVolumes(session, WithoutCompanions(session, options.noise));
+  LoadedVolume form;
+  if (!noise.empty())
+    embedder->SetInputData(1, BlocksOf(noise));
+  if (!options.form.empty()) {
+    form = LoadVolume(session, options.form);
+    embedder->SetInputData(2, form.image);
+  }
+  vtkNew<vtkUltrasoundReader> reader;
+  reader->SetFileName(options.file.c_str());
+  embedder->SetInputConnection(reader->GetOutputPort());
+  const bool isLarge = embedder->IsLargerThanMemory();
+  Session::TakeReportedError(); // who reads the volume tells it
+  try {
+    if (isLarge)
+      return EmbedLarge(session, options, embedder);
+    const LoadedVolume volume = LoadVolume(session, options.file);
+    embedder->SetInputData(0, volume.image);
+    session.Update(embedder, "embed", options.file);
+  } catch (const Error& error) {
+    Fail(error, options, noise);
+  }
+  vtkImageData* result = embedder->GetOutput();
+  LabelCounts voxels{};
+  CountLabels(result, voxels);
+  const std::vector<std::string> lost = SaveVolume(session, result, options.output);
+  Tell(session, options, embedder, result, vtkUltrasoundVolume::GeometryOf(result), voxels, lost);
+}
+
 } // namespace
 
 void EchoramaCommand(CLI::App* options, Action& action)
@@ -122,6 +177,8 @@ void EchoramaCommand(CLI::App* options, Action& action)
   AddParameter(options, embedder, "OverlapDegrees", "--overlap");
   AddParameter(options, embedder, "Seed");
   AddParameter(options, embedder, "PreviewFactor", "--preview");
+  AddParameter(options, embedder, "MaximumMemoryGb", "--memory")
+      ->description("Memory that may be used, GB (0: what is free); a larger volume is embedded slab by slab");
   action = [values, embedder](Session& session) { Embed(session, *values, embedder); };
 }
 

@@ -12,8 +12,6 @@
 #include <cmath>
 #include <memory>
 #include <optional>
-#include <vtkCallbackCommand.h>
-#include <vtkCommand.h>
 #include <vtkDataArray.h>
 #include <vtkFieldData.h>
 #include <vtkNew.h>
@@ -23,7 +21,6 @@
 #include <vtkUltrasoundStitcher.h>
 #include <vtkUltrasoundStitchQuality.h>
 #include <vtkUltrasoundVolume.h>
-#include <vtkUltrasoundWriter.h>
 
 namespace echorama {
 namespace {
@@ -57,12 +54,6 @@ void AddReliability(Session& session, std::vector<LoadedVolume>& volumes)
 std::string Gigabytes(double bytes)
 {
   return Fixed(bytes * 1e-9, bytes < 1e9 ? 3 : 1) + " GB";
-}
-
-bool IsWrittenBySlabs(const std::string& path)
-{
-  const FileFormat format = FormatOfName(path);
-  return format == FileFormat::MetaImage || format == FileFormat::Nrrd || format == FileFormat::Nifti;
 }
 
 std::string VoxelsText(const ImageGeometry& grid)
@@ -115,25 +106,6 @@ private:
   std::ptrdiff_t valid_ = 0, shared_ = 0;
 };
 
-void WriteBySlabs(Session& session, vtkUltrasoundStitcher* stitcher, int slabs, const std::string& path, Pieces& pieces)
-{
-  vtkNew<vtkCallbackCommand> made;
-  const std::function<void()> take = [&] { pieces.Take(stitcher->GetOutput()); };
-  made->SetClientData(const_cast<void*>(static_cast<const void*>(&take)));
-  made->SetCallback(
-      [](vtkObject*, unsigned long, void* function, void*) { (*static_cast<const std::function<void()>*>(function))(); });
-  const unsigned long tag = stitcher->AddObserver(vtkCommand::EndEvent, made);
-  vtkNew<vtkUltrasoundWriter> writer;
-  writer->SetFileName(path.c_str());
-  writer->SetInputConnection(stitcher->GetOutputPort());
-  writer->SetNumberOfSlabs(slabs);
-  bool written = false;
-  session.Watch(writer, "stitch", {}, [&] { written = writer->Write() != 0; });
-  stitcher->RemoveObserver(tag);
-  if (!written)
-    throw Error(Error::Kind::FileSystem, path + ": it cannot be written");
-}
-
 // How visible the seams are, and how much texture was kept.
 void TellQuality(Session& session, vtkImageData* stitched, const std::vector<LoadedVolume>& volumes)
 {
@@ -184,7 +156,7 @@ void Stitch(Session& session, StitchOptions options, vtkUltrasoundStitcher* stit
   if (slabs > 1 && IsWrittenBySlabs(options.output)) {
     session.Note("the result is larger than the memory that is allowed: it is made and written in " + std::to_string(slabs) +
                  " slabs");
-    WriteBySlabs(session, stitcher, slabs, options.output, pieces);
+    WriteBySlabs(session, stitcher, slabs, options.output, "stitch", [&](vtkImageData* piece) { pieces.Take(piece); });
     if (options.quality)
       session.Note("--quality: it needs the whole result in memory, and is left out");
   } else {

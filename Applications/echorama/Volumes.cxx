@@ -4,7 +4,10 @@
 #include "Core/Base/JsonPlace.h"
 #include "Readers/OutputFiles.h"
 #include <sstream>
+#include <vtkCallbackCommand.h>
+#include <vtkCommand.h>
 #include <vtkCompositeDataSet.h>
+#include <vtkImageAlgorithm.h>
 #include <vtkInformation.h>
 #include <vtkNew.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
@@ -77,6 +80,32 @@ std::vector<std::string> WithoutCompanions(Session& session, const std::vector<s
       volumes.push_back(file);
   }
   return volumes;
+}
+
+bool IsWrittenBySlabs(const std::string& path)
+{
+  const FileFormat format = FormatOfName(path);
+  return format == FileFormat::MetaImage || format == FileFormat::Nrrd || format == FileFormat::Nifti;
+}
+
+void WriteBySlabs(Session& session, vtkImageAlgorithm* source, int slabs, const std::string& path, const std::string& stage,
+                  const std::function<void(vtkImageData*)>& take)
+{
+  vtkNew<vtkCallbackCommand> made;
+  const std::function<void()> takeOutput = [&] { take(source->GetOutput()); };
+  made->SetClientData(const_cast<void*>(static_cast<const void*>(&takeOutput)));
+  made->SetCallback(
+      [](vtkObject*, unsigned long, void* function, void*) { (*static_cast<const std::function<void()>*>(function))(); });
+  const unsigned long tag = source->AddObserver(vtkCommand::EndEvent, made);
+  vtkNew<vtkUltrasoundWriter> writer;
+  writer->SetFileName(path.c_str());
+  writer->SetInputConnection(source->GetOutputPort());
+  writer->SetNumberOfSlabs(slabs);
+  bool written = false;
+  session.Watch(writer, stage, {}, [&] { written = writer->Write() != 0; });
+  source->RemoveObserver(tag);
+  if (!written)
+    throw Error(Error::Kind::FileSystem, path + ": it cannot be written");
 }
 
 void MoveVolume(LoadedVolume& volume, const Pose& pose)

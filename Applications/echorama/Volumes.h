@@ -4,11 +4,14 @@
 #include "Core/Geometry/PoseFile.h"
 #include "Readers/VolumeSource.h"
 #include "Session.h"
+#include <functional>
 #include <string>
 #include <vector>
 #include <vtkImageData.h>
 #include <vtkMultiBlockDataSet.h>
 #include <vtkSmartPointer.h>
+
+class vtkImageAlgorithm;
 
 namespace echorama {
 
@@ -52,6 +55,13 @@ vtkSmartPointer<vtkMultiBlockDataSet> BlocksOf(const std::vector<LoadedVolume>&)
 
 /// Writes \a image to \a path. Returns what the format could not hold, one sentence each.
 std::vector<std::string> SaveVolume(Session&, vtkImageData* image, const std::string& path);
+
+/// Whether files of the format of \a path can be written slab by slab.
+bool IsWrittenBySlabs(const std::string& path);
+
+/// Writes the output of \a source in slabs, each made when it is written, and shown to \a take before. Throws Error.
+void WriteBySlabs(Session&, vtkImageAlgorithm* source, int slabs, const std::string& path, const std::string& stage,
+                  const std::function<void(vtkImageData*)>& take);
 
 /// The lines of a text, as filters give notes and reports.
 std::vector<std::string> LinesOf(const std::string& text);

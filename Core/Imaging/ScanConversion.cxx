@@ -32,21 +32,22 @@ constexpr double edge = 1e-3;
 // A straight face is given this bend (radians), which no float can tell, so that one formula serves all.
 constexpr double leastBend = 1e-12;
 
-// One bend of the probe, ready for single precision: index = middle + indexPerRadian * angle.
+// One bend of the probe, ready for single precision: index = middle + indexPerRadian * angle, of \a count beams from the first
+// that is there, of all.
 struct FloatArc {
   float curvature, unit; // see ProbeArc::Bend
   float indexPerRadian, middle, last;
 
-  FloatArc(ProbeArc arc, int count, double offset = 0.0)
+  FloatArc(ProbeArc arc, int all, int first, int count, double offset = 0.0)
   {
     if (arc.width > 0.0)
       arc.angle = std::max(arc.angle, leastBend);
     const ProbeArc::Bend bend = arc.GetBend();
     curvature = static_cast<float>(bend.curvature);
     unit = static_cast<float>(bend.unit);
-    indexPerRadian = arc.angle > 0.0 ? static_cast<float>((count - 1) / arc.angle) : 0.0f;
+    indexPerRadian = arc.angle > 0.0 ? static_cast<float>((all - 1) / arc.angle) : 0.0f;
     last = static_cast<float>(count - 1);
-    middle = static_cast<float>((0.5 - offset) * (count - 1));
+    middle = static_cast<float>((0.5 - offset) * (all - 1) - first);
   }
 };
 
@@ -60,11 +61,6 @@ struct RowPlan {
   explicit RowPlan(int count) : offset(count), inside(count), depth(count), fan(count), sweep(count) {}
   std::vector<int> offset, inside;
   std::vector<float> depth, fan, sweep; // fractions
-};
-
-// The positions of a row in the probe frame: start + step * i, mm.
-struct RowLine {
-  Eigen::Vector3f start, step;
 };
 
 // atan2 for the vector units, to 2e-7: the smaller coordinate over the larger, turned by 45 degrees where that brings it
@@ -122,13 +118,13 @@ ECHORAMA_HOT void PlanAlongArray(const FloatArc fan, const FloatDepth range, con
   }
 }
 
-// Pass 1 for any other row: both bends per voxel.
-ECHORAMA_HOT void PlanOblique(const FloatArc fan, const FloatArc sweep, const FloatDepth range, const RowLine line,
-                              const int samples, const int planeSamples, const int begin, const int end, int* __restrict offset,
-                              int* __restrict inside, float* __restrict depthFraction, float* __restrict fanFraction,
-                              float* __restrict sweepFraction)
+// Pass 1 for any other row, whose voxels lie at start + step * i in the probe frame: both bends per voxel.
+ECHORAMA_HOT void PlanOblique(const FloatArc fan, const FloatArc sweep, const FloatDepth range, const Eigen::Vector3f& start,
+                              const Eigen::Vector3f& step, const int samples, const int planeSamples, const int begin,
+                              const int end, int* __restrict offset, int* __restrict inside, float* __restrict depthFraction,
+                              float* __restrict fanFraction, float* __restrict sweepFraction)
 {
-  const float x0 = line.start[0], y0 = line.start[1], z0 = line.start[2], dx = line.step[0], dy = line.step[1], dz = line.step[2];
+  const float x0 = start[0], y0 = start[1], z0 = start[2], dx = step[0], dy = step[1], dz = step[2];
   for (int i = begin; i < end; ++i) {
     const float n = static_cast<float>(i), x = x0 + dx * n, y = y0 + dy * n, z = z0 + dz * n;
     const float sa = sweep.curvature * y, sb = sweep.unit + sweep.curvature * z;
@@ -257,16 +253,28 @@ void CheckPose(const Pose& probeToWorld)
     throw Error(Error::Kind::BadInput, "scan conversion: the pose of the probe is not rigid");
 }
 
+double MeanSpacing(const std::array<int, 3>& n, const ProbeGeometry& g)
+{
+  const double middle = 0.5 * (g.depthMin + g.depthMax);
+  const double depth = (g.depthMax - g.depthMin) / (n[0] - 1), fan = g.Fan().Span(middle) / (n[1] - 1);
+  if (g.IsPlane())
+    return std::sqrt(depth * fan);
+  const double rho = g.Fan().PointOf({g.fanOffset, middle}).y();
+  return std::cbrt(depth * fan * std::abs(g.Sweep().Span(rho)) / (n[2] - 1));
+}
+
 // The beam volume, the grid and how one lies in the other: all that the rows share.
 class Converter {
 public:
-  Converter(const std::array<int, 3>& beams, const ProbeGeometry& geometry, const Pose& probeToWorld, const ImageGeometry& grid)
-    : geometry_(geometry), beams_(beams), gridToProbe_(probeToWorld.inverse() * grid.IndexToWorld()),
-      fan_(geometry.Fan(), beams[1], geometry.fanOffset), sweep_(geometry.Sweep(), beams[2]), box_(BoxOf(geometry)),
-      count_(grid.dimensions[0])
+  Converter(const std::array<int, 3>& beams, const BeamWindow& of, const ProbeGeometry& geometry, const Pose& probeToWorld,
+            const ImageGeometry& grid)
+    : geometry_(geometry), beams_(beams), of_(of), gridToProbe_(probeToWorld.inverse() * grid.IndexToWorld()),
+      fan_(geometry.Fan(), of.all[1], of.first[1], beams[1], geometry.fanOffset),
+      sweep_(geometry.Sweep(), of.all[2], of.first[2], beams[2]), box_(BoxOf(geometry)), count_(grid.dimensions[0])
   {
-    const double samplesPerMm = (beams[0] - 1) / (geometry.depthMax - geometry.depthMin);
-    range_ = {static_cast<float>(geometry.depthMin), static_cast<float>(samplesPerMm), static_cast<float>(beams[0] - 1)};
+    const double samplesPerMm = (of.all[0] - 1) / (geometry.depthMax - geometry.depthMin);
+    range_ = {static_cast<float>(geometry.depthMin + of.first[0] / samplesPerMm), static_cast<float>(samplesPerMm),
+              static_cast<float>(beams[0] - 1)};
     const Eigen::Vector3d step = gridToProbe_.linear().col(0);
     alongArray_ = std::hypot(step.y(), step.z()) * count_ <= 1e-6;
     // Half a voxel's extent across a single plane.
@@ -279,11 +287,11 @@ public:
       const double angle = geometry.fanAngle * along;
       return std::abs(angle) < 1.5 ? std::tan(angle) / geometry.Fan().GetBend().curvature : otherwise;
     };
-    const double halfFan = 0.5 + edge / (beams[1] - 1);
+    const double halfFan = 0.5 + edge / (of.all[1] - 1);
     firstSlope_ = slope(geometry.fanOffset - halfFan, firstSlope_);
     lastSlope_ = slope(geometry.fanOffset + halfFan, lastSlope_);
     // The edge as a fraction of the geometry, for the exact inverse.
-    tolerance_ = edge * std::min(1.0 / samplesPerMm, SampleSpacing(beams, geometry)) / geometry.Size();
+    tolerance_ = edge * std::min(1.0 / samplesPerMm, MeanSpacing(of.all, geometry)) / geometry.Size();
     // Voxels beyond the samples by less than this are still looked at.
     const double slack = edge * box_.sizes().maxCoeff() + (geometry.IsPlane() ? halfVoxel_ : 0.0);
     box_ = Eigen::AlignedBox3d(box_.min().array() - slack, box_.max().array() + slack);
@@ -302,7 +310,7 @@ public:
     else if (reachesBehind_ || geometry_.IsPlane())
       PlanExactly(start, step, plan, begin, end);
     else
-      PlanOblique(fan_, sweep_, range_, {start.cast<float>(), step.cast<float>()}, beams_[0], beams_[0] * beams_[1], begin, end,
+      PlanOblique(fan_, sweep_, range_, start.cast<float>(), step.cast<float>(), beams_[0], beams_[0] * beams_[1], begin, end,
                   plan.offset.data(), plan.inside.data(), plan.depth.data(), plan.fan.data(), plan.sweep.data());
   }
 
@@ -325,12 +333,8 @@ private:
       from = std::max(from, std::ceil(low));
       to = std::min(to, std::floor(high));
     }
-    begin = 0;
-    end = 0;
-    if (from <= to) {
-      begin = static_cast<int>(from);
-      end = static_cast<int>(to) + 1;
-    }
+    begin = from <= to ? static_cast<int>(from) : 0;
+    end = from <= to ? static_cast<int>(to) + 1 : 0;
   }
 
   void PlanStraight(const Eigen::Vector3d& start, const Eigen::Vector3d& step, RowPlan& plan, int& begin, int& end,
@@ -340,12 +344,12 @@ private:
     const int last = beams_[2] - 1;
     ProbeArc::Place place = sweep.PlaceOf(start.y(), start.z());
     double index = 0.0;
-    if (last == 0) {
+    if (geometry_.IsPlane()) {
       if (std::abs(start.y()) > halfVoxel_)
         end = begin;
     } else {
-      const auto outside = [last, &index](const ProbeArc::Place& p) {
-        index = (p.along + 0.5) * last;
+      const auto outside = [this, last, &index](const ProbeArc::Place& p) {
+        index = (p.along + 0.5) * (of_.all[2] - 1) - of_.first[2];
         return !(index >= -edge && index <= last + edge);
       };
       if (outside(place)) {
@@ -382,30 +386,32 @@ private:
 
   void PlanExactly(const Eigen::Vector3d& start, const Eigen::Vector3d& step, RowPlan& plan, int begin, int end) const
   {
-    const auto split = [](double index, int count, float& fraction) {
-      const int before = std::max(0, std::min(static_cast<int>(index), count - 2));
-      fraction = static_cast<float>(index - before);
-      return before;
-    };
     for (int i = begin; i < end; ++i) {
       Eigen::Vector3d point = start + step * i;
       if (geometry_.IsPlane() && std::abs(point.y()) <= halfVoxel_)
         point.y() = 0.0;
       const auto beam = BeamPointAt(geometry_, point, tolerance_);
+      const auto split = [this, &plan, i](double share, std::size_t axis, float& fraction) {
+        const double index = share * (of_.all[axis] - 1) - of_.first[axis];
+        plan.inside[i] =
+            plan.inside[i] && index > -0.5 && index < beams_[axis] - 0.5; // of a part; what is inside of all is known
+        const int before = std::max(0, std::min(static_cast<int>(index), beams_[axis] - 2));
+        fraction = static_cast<float>(index - before);
+        return before;
+      };
       plan.inside[i] = beam ? 1 : 0;
       plan.offset[i] = 0;
       plan.depth[i] = plan.fan[i] = plan.sweep[i] = 0.0f;
-      if (beam) {
-        const double depth = (beam->depth - geometry_.depthMin) / (geometry_.depthMax - geometry_.depthMin) * (beams_[0] - 1);
-        plan.offset[i] = beams_[0] * (beams_[1] * split((beam->sweep + 0.5) * (beams_[2] - 1), beams_[2], plan.sweep[i]) +
-                                      split((beam->fan + 0.5) * (beams_[1] - 1), beams_[1], plan.fan[i])) +
-                         split(depth, beams_[0], plan.depth[i]);
-      }
+      if (beam)
+        plan.offset[i] =
+            beams_[0] * (beams_[1] * split(beam->sweep + 0.5, 2, plan.sweep[i]) + split(beam->fan + 0.5, 1, plan.fan[i])) +
+            split((beam->depth - geometry_.depthMin) / (geometry_.depthMax - geometry_.depthMin), 0, plan.depth[i]);
     }
   }
 
   ProbeGeometry geometry_;
   std::array<int, 3> beams_;
+  BeamWindow of_;
   Eigen::Affine3d gridToProbe_;
   FloatArc fan_, sweep_;
   FloatDepth range_{};
@@ -436,12 +442,7 @@ void CheckBeamVolume(const std::array<int, 3>& n, const ProbeGeometry& geometry)
 double SampleSpacing(const std::array<int, 3>& n, const ProbeGeometry& g)
 {
   CheckBeamVolume(n, g);
-  const double middle = 0.5 * (g.depthMin + g.depthMax);
-  const double depth = (g.depthMax - g.depthMin) / (n[0] - 1), fan = g.Fan().Span(middle) / (n[1] - 1);
-  if (g.IsPlane())
-    return std::sqrt(depth * fan);
-  const double rho = g.Fan().PointOf({g.fanOffset, middle}).y();
-  return std::cbrt(depth * fan * std::abs(g.Sweep().Span(rho)) / (n[2] - 1));
+  return MeanSpacing(n, g);
 }
 
 ImageGeometry ScanConversionGrid(const ProbeGeometry& geometry, const Pose& probeToWorld, double spacingMm, std::size_t maxVoxels)
@@ -474,15 +475,19 @@ ImageGeometry ScanConversionGrid(const ProbeGeometry& geometry, const Pose& prob
 
 template <class T>
 void ScanConvert(VolumeView<const T> beams, const ProbeGeometry& geometry, const Pose& probeToWorld, const ImageGeometry& grid,
-                 VolumeView<T> intensity, VolumeView<unsigned char> valid, const Progress& progress)
+                 VolumeView<T> intensity, VolumeView<unsigned char> valid, const Progress& progress, const BeamWindow* window)
 {
+  const BeamWindow of = window ? *window : BeamWindow{beams.Dimensions(), {0, 0, 0}};
   CheckBeamVolume(beams.Dimensions(), geometry);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    if (of.first[axis] < 0 || of.first[axis] > of.all[axis] - beams.Dimensions()[axis])
+      throw Error(Error::Kind::BadInput, "scan conversion: the beams are not among those that there are in all");
   grid.Check("the grid of the scan conversion");
   CheckPose(probeToWorld);
   if (intensity.Dimensions() != grid.dimensions || valid.Dimensions() != grid.dimensions)
     throw Error(Error::Kind::BadInput, "scan conversion: the output does not have the dimensions of its grid");
 
-  const Converter converter(beams.Dimensions(), geometry, probeToWorld, grid);
+  const Converter converter(beams.Dimensions(), of, geometry, probeToWorld, grid);
   const int count = grid.dimensions[0], slices = grid.dimensions[2];
   const std::ptrdiff_t rows = static_cast<std::ptrdiff_t>(grid.dimensions[1]) * slices;
   const std::ptrdiff_t nextPlane = beams.Slices() > 1 ? converter.PlaneSamples() : 0;
@@ -509,7 +514,7 @@ void ScanConvert(VolumeView<const T> beams, const ProbeGeometry& geometry, const
 
 #define EchoramaInstantiate(T)                                                                                                   \
   template void ScanConvert<T>(VolumeView<const T>, const ProbeGeometry&, const Pose&, const ImageGeometry&, VolumeView<T>,      \
-                               VolumeView<unsigned char>, const Progress&);
+                               VolumeView<unsigned char>, const Progress&, const BeamWindow*);
 ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
 #undef EchoramaInstantiate
 

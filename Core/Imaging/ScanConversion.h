@@ -12,6 +12,11 @@ namespace echorama {
 /// z. Samples are evenly spaced over [depthMin, depthMax], beams and steps over their whole range, first and last included.
 /// A single plane (ProbeGeometry::IsPlane) has one step.
 
+/// A part of a beam volume that is not there as a whole: samples, beams and steps of all, and the first that are there.
+struct BeamWindow {
+  std::array<int, 3> all{}, first{};
+};
+
 /// Throws Error(BadInput) when a beam volume of these dimensions does not go with the geometry: fewer than 2 samples or
 /// beams, one step where the probe sweeps or several where it does not; Error(TooLarge) for more than 2^31 - 1 samples.
 /// Throws what ProbeGeometry::Check throws.
@@ -42,8 +47,10 @@ ImageGeometry ScanConversionGrid(const ProbeGeometry& geometry, const Pose& prob
 /// Source: dissertation 3.4.5 (image formation), by the exact inverse of the geometry in place of scattering samples.
 /// \throws what CheckBeamVolume throws; Error(BadInput) for a pose that is not rigid, a grid that is none or views that do
 /// not agree with it; Error(Cancelled).
+/// \param window what part of a beam volume \a beams are; nullptr: all. Voxels between others are as if outside.
 template <class T>
 void ScanConvert(VolumeView<const T> beams, const ProbeGeometry& geometry, const Pose& probeToWorld, const ImageGeometry& grid,
-                 VolumeView<T> intensity, VolumeView<unsigned char> valid, const Progress& progress = {});
+                 VolumeView<T> intensity, VolumeView<unsigned char> valid, const Progress& progress = {},
+                 const BeamWindow* window = nullptr);
 
 } // namespace echorama

@@ -164,6 +164,52 @@ TEST(ScanConversion, AgreesOnAnyGrid)
   }
 }
 
+// Some samples, beams and steps of many: what lies between them is as with all, and nothing else is there.
+TEST(ScanConversion, APartOfTheBeamsFillsItsPart)
+{
+  const std::array<int, 3> all{61, 23, 17}, first{9, 5, 4}, count{37, 12, 8};
+  const Pose turned = MotionAbout({3, 5, 7}, {0.4, -1.1, 0.3}, {20, -10, 5});
+  const Volume<float> beams = RandomBeams<float>(all, 0, 255);
+  Volume<float> part(count);
+  for (int k = 0; k < count[2]; ++k)
+    for (int j = 0; j < count[1]; ++j)
+      std::copy_n(beams.View().Row(j + first[1], k + first[2]) + first[0], count[0], part.View().Row(j, k));
+  const BeamWindow window{all, first};
+  for (const Case& c : Cases())
+    for (const Pose& pose : {Pose::Identity(), turned}) {
+      SCOPED_TRACE(c.name);
+      const ImageGeometry grid = ScanConversionGrid(c.probe, Pose::Identity(), 3.1, 1u << 24);
+      const Converted whole = Convert(beams.View(), c.probe, pose, grid);
+      Converted some(grid);
+      ScanConvert<float>(std::as_const(part).View(), c.probe, pose, grid, some.intensity.View(), some.valid.View(), {}, &window);
+      const Eigen::Affine3d toProbe = pose.inverse() * grid.IndexToWorld();
+      const auto& n = grid.dimensions;
+      int inside = 0, wrong = 0;
+      for (int k = 0; k < n[2]; ++k)
+        for (int j = 0; j < n[1]; ++j)
+          for (int i = 0; i < n[0]; ++i) {
+            const Place place = PlaceOf(c.probe, all, toProbe * Eigen::Vector3d(i, j, k));
+            double within = place.inside ? 1.0 : -1.0; // in distances between samples, beams or steps
+            for (int axis = 0; place.inside && axis < 3; ++axis)
+              within = std::min({within, place.index[axis] - first[axis], first[axis] + count[axis] - 1 - place.index[axis]});
+            const bool valid = some.valid.View()(i, j, k) != 0;
+            wrong += (within > 0.01 && !valid) || (within < -0.51 && valid);
+            wrong += valid && !(whole.valid.View()(i, j, k) != 0);
+            if (valid && within > 0.01) {
+              ++inside;
+              wrong += std::abs(some.intensity.View()(i, j, k) - whole.intensity.View()(i, j, k)) > 0.05f;
+            }
+          }
+      EXPECT_EQ(wrong, 0);
+      EXPECT_GT(inside, 100);
+    }
+  const BeamWindow beyond{all, {30, 5, 4}};
+  Converted none(ScanConversionGrid(Cases()[0].probe, turned, 3.1, 1u << 24));
+  EXPECT_THROW(ScanConvert<float>(std::as_const(part).View(), Cases()[0].probe, turned, none.grid, none.intensity.View(),
+                                  none.valid.View(), {}, &beyond),
+               Error);
+}
+
 TEST(ScanConversion, RampsAreCoordinates)
 {
   // Beams that hold their own depth give the depth of each voxel, to single precision.

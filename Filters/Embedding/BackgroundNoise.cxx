@@ -8,16 +8,18 @@
 namespace echorama {
 
 template <class T>
-BackgroundNoise NoiseBehind(const PosedVolume<T>& volume, const PlacedProbe& form, const Progress& progress)
+BackgroundNoise NoiseBehind(const PosedVolume<T>& volume, const PlacedProbe& form, const Progress& progress,
+                            const PlacedProbe* along)
 {
   BackgroundNoise noise;
+  const PlacedProbe& beams = along ? *along : form;
   try {
-    const NoiseMatch match = MatchNoise(volume, form.geometry, form.probeToWorld, {}, progress);
+    const NoiseMatch match = MatchNoise(volume, beams.geometry, beams.probeToWorld, {}, progress);
     noise.speckleShare = match.speckleShare;
     noise.grains = match.grains;
     if (match.grains >= NoiseMatch::leastGrains) {
-      noise.parameters = NoiseLike(match, form.geometry, form.geometry);
-      noise.grainMm = GrainOf(match, form.geometry);
+      noise.parameters = NoiseLike(match, beams.geometry, form.geometry);
+      noise.grainMm = GrainOf(match, beams.geometry);
       return noise;
     }
   } catch (const Error& error) {
@@ -36,7 +38,7 @@ BackgroundNoise NoiseBehind(const PosedVolume<T>& volume, const PlacedProbe& for
 }
 
 #define EchoramaInstantiate(T)                                                                                                   \
-  template BackgroundNoise NoiseBehind<T>(const PosedVolume<T>&, const PlacedProbe&, const Progress&);
+  template BackgroundNoise NoiseBehind<T>(const PosedVolume<T>&, const PlacedProbe&, const Progress&, const PlacedProbe*);
 ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
 #undef EchoramaInstantiate
 

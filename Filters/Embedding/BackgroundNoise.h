@@ -15,8 +15,10 @@ struct BackgroundNoise {
 
 /// Noise with the grain of \a volume for the fan \a form around it. Where there is less speckle than leastGrains, grains are two
 /// voxels long and three wide halfway down, as volumes are sampled that lose nothing.
-/// \throws as MatchNoise, but for Error(NotPossible)
+/// \param along the beams along which it is measured, where \a volume is a small part of what the form is around; nullptr: the
+/// form \throws as MatchNoise, but for Error(NotPossible)
 template <class T>
-BackgroundNoise NoiseBehind(const PosedVolume<T>& volume, const PlacedProbe& form, const Progress& progress = {});
+BackgroundNoise NoiseBehind(const PosedVolume<T>& volume, const PlacedProbe& form, const Progress& progress = {},
+                            const PlacedProbe* along = nullptr);
 
 } // namespace echorama

@@ -295,14 +295,30 @@ void FilterRows(const Field& in, std::ptrdiff_t first, std::ptrdiff_t stride, co
 
 } // namespace
 
+std::array<int, 3> BeamNoiseSize(const BeamNoiseParameters& parameters, const ProbeGeometry& geometry)
+{
+  return {parameters.samples, parameters.elements, geometry.IsPlane() ? 1 : parameters.steps};
+}
+
 Volume<float> MakeBeamNoise(const BeamNoiseParameters& parameters, const ProbeGeometry& geometry, const Progress& progress)
 {
+  const std::array<int, 3> size = BeamNoiseSize(parameters, geometry);
+  CheckBeamVolume(size, geometry);
+  return MakeBeamNoise(parameters, geometry, {0, 0, 0}, size, progress);
+}
+
+Volume<float> MakeBeamNoise(const BeamNoiseParameters& parameters, const ProbeGeometry& geometry, const std::array<int, 3>& first,
+                            const std::array<int, 3>& size, const Progress& progress)
+{
   Check(parameters, geometry);
-  const int samples = parameters.samples, elements = parameters.elements, steps = geometry.IsPlane() ? 1 : parameters.steps;
-  CheckBeamVolume({samples, elements, steps}, geometry);
-  const auto alongDepth = PointSpread(parameters.depthCorrelationMm / (geometry.depthMax - geometry.depthMin) * (samples - 1));
-  const auto acrossFan = PointSpread(parameters.fanCorrelation * (elements - 1));
-  const auto alongSweep = PointSpread(parameters.sweepCorrelation * (steps - 1));
+  const std::array<int, 3> all = BeamNoiseSize(parameters, geometry);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    if (first[axis] < 0 || size[axis] < 1 || first[axis] > all[axis] - size[axis])
+      throw Error(Error::Kind::BadInput, "noise: the part that is asked for is not one of the whole");
+  const int samples = size[0], elements = size[1], steps = size[2];
+  const auto alongDepth = PointSpread(parameters.depthCorrelationMm / (geometry.depthMax - geometry.depthMin) * (all[0] - 1));
+  const auto acrossFan = PointSpread(parameters.fanCorrelation * (all[1] - 1));
+  const auto alongSweep = PointSpread(parameters.sweepCorrelation * (all[2] - 1));
   const auto radius = [](const std::vector<float>& taps) { return static_cast<int>(taps.size() / 2); };
   const int depthRadius = radius(alongDepth), fanRadius = radius(acrossFan), sweepRadius = radius(alongSweep);
   const Development development(parameters);
@@ -312,15 +328,16 @@ Volume<float> MakeBeamNoise(const BeamNoiseParameters& parameters, const ProbeGe
   Field field(static_cast<std::size_t>(planeSize) * static_cast<std::size_t>(planes));
   ParallelFor(planes, progress.Part(0.0, 0.7), [&](std::ptrdiff_t plane) {
     // Blocks of random numbers serve two samples, so the row begins at an even one.
-    const int before = depthRadius + depthRadius % 2, blocks = (before + samples + depthRadius + 1) / 2;
+    const int before = depthRadius + std::abs(first[0] - depthRadius) % 2;
+    const int blocks = (before + samples + depthRadius + 1) / 2;
     const int rows = elements + 2 * fanRadius;
     std::vector<std::int32_t> radiusWords(static_cast<std::size_t>(2 * blocks)), turnWords(radiusWords.size());
     Field white(radiusWords.size());
     Field filtered(static_cast<std::size_t>(rows) * static_cast<std::size_t>(samples));
     for (int row = 0; row < rows; ++row) {
-      const std::uint64_t item = static_cast<std::uint64_t>(plane - sweepRadius + streamOrigin) << 32 |
-                                 static_cast<std::uint64_t>(row - fanRadius + streamOrigin);
-      Words(parameters.seed, item, static_cast<std::uint64_t>((streamOrigin - before) / 2), blocks, radiusWords.data(),
+      const std::uint64_t item = static_cast<std::uint64_t>(plane + first[2] - sweepRadius + streamOrigin) << 32 |
+                                 static_cast<std::uint64_t>(row + first[1] - fanRadius + streamOrigin);
+      Words(parameters.seed, item, static_cast<std::uint64_t>((streamOrigin + first[0] - before) / 2), blocks, radiusWords.data(),
             turnWords.data());
       Normals(radiusWords.data(), turnWords.data(), 2 * blocks, white.real.data(), white.imaginary.data());
       const std::ptrdiff_t to = static_cast<std::ptrdiff_t>(row) * samples;

@@ -4,6 +4,7 @@
 #include "Core/Base/Progress.h"
 #include "Core/Geometry/ProbeGeometry.h"
 #include "Core/Imaging/VolumeView.h"
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -49,6 +50,14 @@ ParameterList Describe(BeamNoiseParameters& p);
 /// for more than 2^31 - 1 samples, Error(Cancelled). Source: dissertation 6.2; Wagner, Smith, Sandrik, Lopez, IEEE Trans. Sonics
 /// Ultrason. 1983 (statistics of speckle).
 Volume<float> MakeBeamNoise(const BeamNoiseParameters& parameters, const ProbeGeometry& geometry, const Progress& progress = {});
+
+/// A part of the same: \a size samples, beams and steps from \a first on. There may be any number of samples in all.
+/// \throws as the whole, and Error(BadInput) for a part that is not one
+Volume<float> MakeBeamNoise(const BeamNoiseParameters& parameters, const ProbeGeometry& geometry, const std::array<int, 3>& first,
+                            const std::array<int, 3>& size, const Progress& progress = {});
+
+/// How many samples, beams and steps the whole has.
+std::array<int, 3> BeamNoiseSize(const BeamNoiseParameters& parameters, const ProbeGeometry& geometry);
 
 /// The parameters with as many samples, elements and steps as the correlation lengths need, \a perLength to each: with 3 the
 /// deviation after scan conversion is nowhere more than 6% lower (12% of log-compressed greys) than that of the samples. Where a

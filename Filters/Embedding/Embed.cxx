@@ -90,19 +90,32 @@ Volume<unsigned char> Grown(VolumeView<const unsigned char> mask)
   return grown;
 }
 
-// The local mean and deviation at the surface of the data, spread to wherever background shows.
-struct SpreadStatistics {
-  Blocks blocks;
-  Volume<double> mean, deviation;
+// Where background shows, and where nothing else does.
+struct Masks {
+  Masks(const EmbedParameters& parameters, VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing,
+        VolumeView<const unsigned char> form, const Progress& progress)
+    : weights(region.Dimensions()), shown(region.Dimensions()), bare(region.Dimensions())
+  {
+    FeatherWeights(parameters, region, form, spacing, weights.View(), progress);
+    ParallelRanges(region.Size(), 1 << 16, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+      for (std::ptrdiff_t at = begin; at < end; ++at) {
+        const bool inside = form.Empty() || form[at];
+        shown.View()[at] = inside && weights.View()[at] < 1.0f;
+        bare.View()[at] = inside && !region[at];
+      }
+    });
+  }
+  Volume<float> weights;
+  Volume<unsigned char> shown, bare;
 };
 
 template <class T>
-SpreadStatistics Spread(const EmbedParameters& parameters, const LocalStatistics& statistics, VolumeView<const T> intensity,
-                        VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing,
-                        VolumeView<const unsigned char> shown, VolumeView<const unsigned char> bare, const Progress& progress)
+EmbedLevels Spread(const EmbedParameters& parameters, const LocalStatistics& statistics, VolumeView<const T> intensity,
+                   VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing, VolumeView<const unsigned char> shown,
+                   VolumeView<const unsigned char> bare, const Progress& progress)
 {
   const double roundedVariance = std::is_integral_v<T> ? 1.0 / 12.0 : 0.0; // that rounding adds to data and result alike
-  SpreadStatistics spread;
+  EmbedLevels spread;
   const Blocks& blocks = spread.blocks = BlocksFor(parameters, region.Dimensions(), spacing);
   std::vector<Volume<unsigned char>> some = BlocksWith(blocks, {region, shown, bare}, progress.Part(0.0, 0.2));
   const Volume<unsigned char>&held = some[0], &showing = some[1];
@@ -198,6 +211,59 @@ double EmbedMemory(const EmbedParameters& parameters, const ImageGeometry& grid)
          60.0 * std::min(voxels, static_cast<double>(parameters.diffusionVoxels)) + 0.3e9;
 }
 
+namespace {
+
+void CheckSizes(const std::vector<std::array<int, 3>>& sizes, const std::array<int, 3>& n)
+{
+  if (std::any_of(sizes.begin(), sizes.end(), [&n](const std::array<int, 3>& size) { return size != n; }))
+    throw Error(Error::Kind::BadInput, "embedding: data, region, noise, form and labels do not have one size");
+}
+
+void CheckSomeData(VolumeView<const unsigned char> region)
+{
+  if (std::none_of(region.begin(), region.end(), [](unsigned char real) { return real != 0; }))
+    throw Error(Error::Kind::BadInput, "embedding: no voxel of the data is valid");
+}
+
+// Noise that has the levels, and the data over it. \a first: where this part begins on the grid of the levels.
+template <class T>
+void Render(const EmbedParameters& parameters, const EmbedLevels& levels, const std::array<int, 3>& first, const Masks& masks,
+            VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing, VolumeView<float> noise,
+            VolumeView<const unsigned char> form, VolumeView<T> intensity, VolumeView<unsigned char> labels,
+            const LocalStatistics* statistics, const Progress& progress)
+{
+  const auto& n = intensity.Dimensions();
+  const VolumeView<const unsigned char> shown = masks.shown.View();
+  const ToneMappingParameters tone{parameters.smoothMm, parameters.matchContrast};
+  ExtractGrain(tone, noise, form, spacing, noise, progress.Part(0.0, 0.5), shown);
+  const BlockRows rows(levels.blocks, {levels.mean.View(), levels.deviation.View()});
+  ParallelFor(n[2], progress.Part(0.5, 0.6), [&](std::ptrdiff_t slice) {
+    const int k = static_cast<int>(slice);
+    std::vector<double> values(2 * static_cast<std::size_t>(n[0]));
+    double* const local[2] = {values.data(), values.data() + n[0]};
+    for (int j = 0; j < n[1]; ++j) {
+      const unsigned char* const shows = shown.Row(j, k);
+      float* const grain = noise.Row(j, k);
+      int begin = 0, end = n[0];
+      while (begin < end && !shows[begin])
+        ++begin;
+      while (begin < end && !shows[end - 1])
+        --end;
+      rows.Row(j + first[1], k + first[2], begin + first[0], end + first[0], local);
+      std::fill(grain, grain + begin, std::numeric_limits<float>::quiet_NaN()); // nobody sees it, and it was not worked out
+      std::fill(grain + end, grain + n[0], std::numeric_limits<float>::quiet_NaN());
+      for (int i = begin; i < end; ++i)
+        grain[i] = shows[i] ? ApplyGrain(parameters.matchContrast, grain[i], static_cast<float>(local[0][i - begin]),
+                                         static_cast<float>(local[1][i - begin]))
+                            : std::numeric_limits<float>::quiet_NaN();
+    }
+  });
+  Feather<T>(parameters, masks.weights.View(), region, noise, form, spacing, intensity, labels, progress.Part(0.6, 1.0),
+             statistics);
+}
+
+} // namespace
+
 template <class T>
 void Embed(const EmbedParameters& parameters, VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing,
            VolumeView<float> noise, VolumeView<const unsigned char> form, VolumeView<T> intensity,
@@ -205,64 +271,56 @@ void Embed(const EmbedParameters& parameters, VolumeView<const unsigned char> re
 {
   CheckRanges(parameters);
   const auto& n = intensity.Dimensions();
-  if (region.Dimensions() != n || noise.Dimensions() != n || labels.Dimensions() != n ||
-      (!form.Empty() && form.Dimensions() != n))
-    throw Error(Error::Kind::BadInput, "embedding: data, region, noise, form and labels do not have one size");
-  if (std::none_of(region.begin(), region.end(), [](unsigned char real) { return real != 0; }))
-    throw Error(Error::Kind::BadInput, "embedding: no voxel of the data is valid");
-
-  Volume<float> weights(n);
-  FeatherWeights(parameters, region, form, spacing, weights.View(), progress.Part(0.0, 0.15));
-
-  // where background shows, and where nothing else does
-  Volume<unsigned char> shown(n), bare(n);
-  ParallelRanges(region.Size(), 1 << 16, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-    for (std::ptrdiff_t at = begin; at < end; ++at) {
-      const bool inside = form.Empty() || form[at];
-      shown.View()[at] = inside && weights.View()[at] < 1.0f;
-      bare.View()[at] = inside && !region[at];
-    }
-  });
-
-  // 1. what the data are like at their surface, everywhere
+  CheckSizes({region.Dimensions(), noise.Dimensions(), labels.Dimensions(), form.Empty() ? n : form.Dimensions()}, n);
+  CheckSomeData(region);
+  const Masks masks(parameters, region, spacing, form, progress.Part(0.0, 0.15));
   const LocalStatistics statistics =
       GrainStatistics(VolumeView<const T>(intensity), region, spacing, parameters.smoothMm, progress.Part(0.15, 0.25));
-  const SpreadStatistics spread = Spread<T>(parameters, statistics, intensity, region, spacing, std::as_const(shown).View(),
-                                            std::as_const(bare).View(), progress.Part(0.25, 0.5));
+  const EmbedLevels levels = Spread<T>(parameters, statistics, intensity, region, spacing, masks.shown.View(), masks.bare.View(),
+                                       progress.Part(0.25, 0.5));
+  Render<T>(parameters, levels, {0, 0, 0}, masks, region, spacing, noise, form, intensity, labels, &statistics,
+            progress.Part(0.5, 1.0));
+}
 
-  // 2. noise of that kind
-  const ToneMappingParameters tone{parameters.smoothMm, parameters.matchContrast};
-  ExtractGrain(tone, noise, form, spacing, noise, progress.Part(0.5, 0.75), std::as_const(shown).View());
-  const BlockRows rows(spread.blocks, {spread.mean.View(), spread.deviation.View()});
-  ParallelFor(n[2], progress.Part(0.75, 0.8), [&](std::ptrdiff_t slice) {
-    const int k = static_cast<int>(slice);
-    std::vector<double> values(2 * static_cast<std::size_t>(n[0]));
-    double* const local[2] = {values.data(), values.data() + n[0]};
-    for (int j = 0; j < n[1]; ++j) {
-      const unsigned char* const shows = shown.View().Row(j, k);
-      float* const grain = noise.Row(j, k);
-      int first = 0, last = n[0];
-      while (first < last && !shows[first])
-        ++first;
-      while (first < last && !shows[last - 1])
-        --last;
-      rows.Row(j, k, first, last, local);
-      std::fill(grain, grain + first, std::numeric_limits<float>::quiet_NaN()); // nobody sees it, and it was not worked out
-      std::fill(grain + last, grain + n[0], std::numeric_limits<float>::quiet_NaN());
-      for (int i = first; i < last; ++i)
-        grain[i] = shows[i] ? ApplyGrain(parameters.matchContrast, grain[i], static_cast<float>(local[0][i - first]),
-                                         static_cast<float>(local[1][i - first]))
-                            : std::numeric_limits<float>::quiet_NaN();
-    }
-  });
+template <class T>
+EmbedLevels LevelsAround(const EmbedParameters& parameters, VolumeView<const unsigned char> region,
+                         const Eigen::Vector3d& spacing, VolumeView<const unsigned char> form, VolumeView<const T> intensity,
+                         const Progress& progress)
+{
+  CheckRanges(parameters);
+  const auto& n = intensity.Dimensions();
+  CheckSizes({region.Dimensions(), form.Empty() ? n : form.Dimensions()}, n);
+  CheckSomeData(region);
+  const Masks masks(parameters, region, spacing, form, progress.Part(0.0, 0.3));
+  const LocalStatistics statistics = GrainStatistics(intensity, region, spacing, parameters.smoothMm, progress.Part(0.3, 0.6));
+  return Spread<T>(parameters, statistics, intensity, region, spacing, masks.shown.View(), masks.bare.View(),
+                   progress.Part(0.6, 1.0));
+}
 
-  // 3. the data over it
-  Feather<T>(parameters, weights.View(), region, noise, form, spacing, intensity, labels, progress.Part(0.8, 1.0), &statistics);
+template <class T>
+void EmbedPart(const EmbedParameters& parameters, const EmbedLevels& levels, const std::array<int, 3>& first,
+               VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing, VolumeView<float> noise,
+               VolumeView<const unsigned char> form, VolumeView<T> intensity, VolumeView<unsigned char> labels,
+               const Progress& progress)
+{
+  CheckRanges(parameters);
+  const auto& n = intensity.Dimensions();
+  CheckSizes({region.Dimensions(), noise.Dimensions(), labels.Dimensions(), form.Empty() ? n : form.Dimensions()}, n);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    if (first[axis] < 0 || first[axis] > levels.blocks.voxels[axis] - n[axis])
+      throw Error(Error::Kind::BadInput, "embedding: the part is not one of the grid");
+  const Masks masks(parameters, region, spacing, form, progress.Part(0.0, 0.3));
+  Render<T>(parameters, levels, first, masks, region, spacing, noise, form, intensity, labels, nullptr, progress.Part(0.3, 1.0));
 }
 
 #define EchoramaInstantiate(T)                                                                                                   \
   template void Embed(const EmbedParameters&, VolumeView<const unsigned char>, const Eigen::Vector3d&, VolumeView<float>,        \
-                      VolumeView<const unsigned char>, VolumeView<T>, VolumeView<unsigned char>, const Progress&);
+                      VolumeView<const unsigned char>, VolumeView<T>, VolumeView<unsigned char>, const Progress&);               \
+  template EmbedLevels LevelsAround(const EmbedParameters&, VolumeView<const unsigned char>, const Eigen::Vector3d&,             \
+                                    VolumeView<const unsigned char>, VolumeView<const T>, const Progress&);                      \
+  template void EmbedPart(const EmbedParameters&, const EmbedLevels&, const std::array<int, 3>&,                                 \
+                          VolumeView<const unsigned char>, const Eigen::Vector3d&, VolumeView<float>,                            \
+                          VolumeView<const unsigned char>, VolumeView<T>, VolumeView<unsigned char>, const Progress&);
 ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
 #undef EchoramaInstantiate
 

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include "BlockRows.h"
 #include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Imaging/VolumeView.h"
 #include "Diffusion.h"
 #include "Feather.h"
+#include <algorithm>
 
 namespace echorama {
 
@@ -36,5 +38,33 @@ template <class T>
 void Embed(const EmbedParameters& parameters, VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing,
            VolumeView<float> noise, VolumeView<const unsigned char> form, VolumeView<T> intensity,
            VolumeView<unsigned char> labels, const Progress& progress = {});
+
+/// The local mean and deviation of the data at their surface, spread to wherever background shows: a number per block of voxels.
+struct EmbedLevels {
+  Blocks blocks;
+  Volume<double> mean, deviation;
+};
+
+/// The first half of Embed: what a part of the result depends on beyond its neighbourhood.
+/// \throws as Embed
+template <class T>
+EmbedLevels LevelsAround(const EmbedParameters& parameters, VolumeView<const unsigned char> region,
+                         const Eigen::Vector3d& spacing, VolumeView<const unsigned char> form, VolumeView<const T> intensity,
+                         const Progress& progress = {});
+
+/// The second half, for a part of the grid of the levels that begins at voxel \a first. Voxels nearer to the border of the part
+/// than HaloMm, where that is not a border of the grid as well, are not those of the whole.
+/// \throws as Embed, but a part may be without data
+template <class T>
+void EmbedPart(const EmbedParameters& parameters, const EmbedLevels& levels, const std::array<int, 3>& first,
+               VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing, VolumeView<float> noise,
+               VolumeView<const unsigned char> form, VolumeView<T> intensity, VolumeView<unsigned char> labels,
+               const Progress& progress = {});
+
+/// How far the neighbourhood of a voxel reaches: the windows of local statistics, or the feather.
+inline double HaloMm(const EmbedParameters& parameters)
+{
+  return std::max(4.0 * parameters.smoothMm, parameters.featherMm);
+}
 
 } // namespace echorama

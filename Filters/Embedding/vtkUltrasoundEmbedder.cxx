@@ -8,9 +8,10 @@
 #include "Core/Base/NumberText.h"
 #include "Core/Geometry/EnclosingFan.h"
 #include "Core/Imaging/Sampling.h"
-#include "Core/Imaging/ScanConversion.h"
 #include "Embed.h"
+#include "EmbedSlabs.h"
 #include "FanFilling.h"
+#include "FanNoise.h"
 #include "NoiseTiling.h"
 #include "vtkUltrasoundAcquisition.h"
 #include "vtkUltrasoundFeather.h"
@@ -22,6 +23,7 @@
 #include "vtkObjectFactory.h"
 #include "vtkPointData.h"
 #include "vtkSmartPointer.h"
+#include "vtkStreamingDemandDrivenPipeline.h"
 
 #include <algorithm>
 #include <array>
@@ -78,12 +80,13 @@ struct vtkUltrasoundEmbedder::Settings {
   bool matchGrain = true;
   std::uint64_t seed = 1;
   int previewFactor = 1;
+  double maximumMemoryGb = 0.0;
 };
 
 //----------------------------------------------------------------------------
 echorama::ParameterList vtkUltrasoundEmbedder::Parameters()
 {
-  using echorama::Parameter;
+  using echorama::Parameter, echorama::Unlimited;
   Settings& v = *this->Values;
   echorama::ParameterList embed = echorama::Without(Describe(v.embed), {"Exact", "Accuracy", "DiffusionVoxels"});
   Parameter& feather = echorama::Named(embed, "FeatherMm");
@@ -98,8 +101,11 @@ echorama::ParameterList vtkUltrasoundEmbedder::Parameters()
            "the data have too little speckle to tell, grains are two voxels long and three wide.")},
        echorama::Without(Describe(v.tiling), {"Columns", "Rows", "OverlapMm", "SpacingMm"}),
        {Parameter("Seed", v.seed, {0, 9223372036854775807.0}, "", "The same seed makes the same noise."),
-        Parameter("PreviewFactor", v.previewFactor, {1, 64}, "",
-                  "For a quick look: only every so many voxels along each axis.")}});
+        Parameter("PreviewFactor", v.previewFactor, {1, 64}, "", "For a quick look: only every so many voxels along each axis."),
+        Parameter(
+            "MaximumMemoryGb", v.maximumMemoryGb, {0, Unlimited}, "GB",
+            "What may be used, in 10^9 bytes. A volume that needs more is embedded slab by slab, as its output is asked for. 0: "
+            "the memory that is free.")}});
 }
 
 //----------------------------------------------------------------------------
@@ -129,8 +135,15 @@ int vtkUltrasoundEmbedder::FillInputPortInformation(int port, vtkInformation* in
 int vtkUltrasoundEmbedder::RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
   // The fan, and with it the grid, depends on the data.
-  vtkUltrasoundVolume::MakeInput(this, 0);
   vtkUltrasoundVolume::MakeInput(this, 2);
+  if (this->IsLarge()) {
+    return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress& progress) {
+      echorama::CheckRanges(this->Parameters());
+      vtkUltrasoundVolume::SetGeometry(outputs->GetInformationObject(0), this->PrepareSlabs(inputs, progress).Grid());
+    });
+  }
+  this->Slabs.reset();
+  vtkUltrasoundVolume::MakeInput(this, 0);
   if (!vtkImageData::GetData(inputs[0])) {
     return 1; // a composite data set, whose blocks come one by one later
   }
@@ -139,6 +152,210 @@ int vtkUltrasoundEmbedder::RequestInformation(vtkInformation*, vtkInformationVec
     // It takes well below a second: a stop is left to the data, whose request takes it back.
     vtkUltrasoundVolume::SetGeometry(outputs->GetInformationObject(0), this->Prepare(inputs, {}).Grid.geometry);
   });
+}
+
+//----------------------------------------------------------------------------
+double vtkUltrasoundEmbedder::AllowedBytes() const
+{
+  const double allowed = 1e9 * this->Values->maximumMemoryGb;
+  return allowed > 0.0 ? allowed : echorama::FreeMemory();
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundEmbedder::IsLargerThanMemory()
+{
+  int port = 0;
+  vtkAlgorithm* producer = this->GetNumberOfInputConnections(0) == 1 ? this->GetInputAlgorithm(0, 0, port) : nullptr;
+  return producer && producer->GetExecutive()->UpdateInformation() && this->IsLarge();
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundEmbedder::IsLarge()
+{
+  int port = 0;
+  vtkInformation* input =
+      this->GetNumberOfInputConnections(0) == 1 ? this->GetInputAlgorithm(0, 0, port)->GetOutputInformation(port) : nullptr;
+  if (!input || !input->Has(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT()) || !input->Has(vtkDataObject::SPACING()) ||
+      this->Values->previewFactor > 1) {
+    return false;
+  }
+  echorama::ImageGeometry grid;
+  int whole[6];
+  input->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), whole);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    grid.dimensions[axis] = whole[2 * axis + 1] - whole[2 * axis] + 1;
+  }
+  if (*std::min_element(grid.dimensions.begin(), grid.dimensions.end()) < 2) {
+    return false;
+  }
+  input->Get(vtkDataObject::SPACING(), grid.spacing.data());
+  echorama::EmbedParameters parameters = this->Values->embed;
+  parameters.featherMm = std::max(parameters.featherMm, 0.0);
+  // The input, and the result at least: a voxel and its valid region each.
+  return echorama::EmbedMemory(parameters, grid) + 4.0 * static_cast<double>(grid.VoxelCount()) > this->AllowedBytes();
+}
+
+//----------------------------------------------------------------------------
+vtkImageData* vtkUltrasoundEmbedder::InputSlices(int first, int count)
+{
+  int port = 0;
+  vtkAlgorithm* producer = this->GetInputAlgorithm(0, 0, port);
+  int extent[6];
+  producer->GetOutputInformation(port)->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), extent);
+  extent[4] += first;
+  extent[5] = extent[4] + count - 1;
+  const vtkNew<vtkInformationVector> requests;
+  requests->SetNumberOfInformationObjects(producer->GetNumberOfOutputPorts());
+  requests->GetInformationObject(port)->Set(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT(), extent, 6);
+  const bool made = producer->Update(port, requests) != 0;
+  vtkImageData* slices = made ? vtkImageData::SafeDownCast(producer->GetOutputDataObject(port)) : nullptr;
+  if (!slices || slices->GetNumberOfPoints() == 0) {
+    throw Error(Error::Kind::BadInput,
+                "the input failed at slices " + std::to_string(first) + " to " + std::to_string(first + count - 1));
+  }
+  return slices;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundEmbedder::ShowSlices(vtkImageData* slices, const SlicesUse& use)
+{
+  const auto input = vtkUltrasoundVolume::CheckInput(this, slices, "the input");
+  vtkUltrasoundFeather::RefuseEmbedded(slices);
+  vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
+    using T = decltype(type);
+    const Volume<unsigned char> region = echorama::RealRegionOf(vtkUltrasoundVolume::PosedVolumeOf<T>(input));
+    use(vtkUltrasoundVolume::ViewOf<const T>(input.Intensity, slices).Data(), region.View().Data());
+  });
+}
+
+//----------------------------------------------------------------------------
+echorama::EmbedSlabs& vtkUltrasoundEmbedder::PrepareSlabs(vtkInformationVector** inputs, const echorama::Progress& progress)
+{
+  int port = 0;
+  vtkAlgorithm* producer = this->GetInputAlgorithm(0, 0, port);
+  vtkImageData* shape = inputs[2]->GetNumberOfInformationObjects() > 0 ? vtkImageData::GetData(inputs[2]) : nullptr;
+  auto* pipeline = vtkDemandDrivenPipeline::SafeDownCast(producer->GetExecutive());
+  const PlanKey key{{{this, this->GetMTime()},
+                     {producer, pipeline ? pipeline->GetPipelineMTime() : 0},
+                     {shape, shape ? shape->GetMTime() : 0}}};
+  if (this->Slabs && this->PlannedFor == key) {
+    return *this->Slabs;
+  }
+  this->Slabs.reset();
+  this->Planned.reset();
+  this->Warned = false;
+  if (this->GetNumberOfInputConnections(1) > 0) {
+    throw Error(Error::Kind::InvalidParameter,
+                "a volume that is larger than the memory cannot have noise volumes; its noise is made");
+  }
+  int whole[6];
+  producer->GetOutputInformation(port)->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), whole);
+  const int slices = whole[5] - whole[4] + 1;
+  echorama::EmbedSlabs::Settings settings{this->Values->embed, this->Values->enclosing, this->Values->matchGrain,
+                                          this->Values->seed, this->AllowedBytes()};
+  if (shape) {
+    settings.enclosing.shape =
+        vtkUltrasoundProbeFit::ProbeOf(vtkUltrasoundVolume::CheckInput(this, shape, "the form"), nullptr, {});
+  }
+  std::unique_ptr<echorama::EmbedSlabs> planned;
+  for (int first = 0, count = 1; first < slices; first += count, count = planned->SlicesAtATime()) {
+    count = std::min(count, slices - first);
+    vtkImageData* image = this->InputSlices(first, count);
+    if (!planned) {
+      const auto input = vtkUltrasoundVolume::CheckInput(this, image, "the input");
+      echorama::ImageGeometry data = vtkUltrasoundVolume::GeometryOf(image); // of its first slice
+      data.dimensions[2] = slices;
+      vtkUltrasoundVolume::Dispatch(input.Intensity,
+                                    [&](auto type) { planned = echorama::EmbedSlabs::Make<decltype(type)>(settings, data); });
+      this->SlabType = input.Intensity->GetDataType();
+      this->SlabName = input.Intensity->GetName() ? input.Intensity->GetName() : vtkUltrasoundVolume::IntensityName();
+    }
+    this->ShowSlices(image,
+                     [&](const void* intensity, const unsigned char* region) { planned->Look(first, count, intensity, region); });
+    progress(0.8 * (first + count) / slices);
+  }
+  planned->Plan(progress.Part(0.8, 1.0));
+  this->Slabs = std::move(planned);
+  this->PlannedFor = key;
+  return *this->Slabs;
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundEmbedder::RequestUpdateExtent(vtkInformation* request, vtkInformationVector** inputs,
+                                               vtkInformationVector* outputs)
+{
+  this->Superclass::RequestUpdateExtent(request, inputs, outputs);
+  if (this->Slabs) { // the first slices of those that are missing; the others are asked for when these are taken
+    vtkInformation* in = inputs[0]->GetInformationObject(0);
+    int wanted[6], extent[6];
+    outputs->GetInformationObject(0)->Get(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT(), wanted);
+    in->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), extent);
+    const auto [from, to] = this->Slabs->Missing(wanted[4], wanted[5] + 1);
+    vtkImageData* last = vtkImageData::GetData(in);
+    if (from < to) {
+      extent[4] += from;
+      extent[5] = extent[4] + std::min(this->Slabs->SlicesAtATime(), to - from) - 1;
+    } else if (last && last->GetNumberOfPoints() > 0) {
+      last->GetExtent(extent); // nothing is
+    } else {
+      extent[5] = extent[4];
+    }
+    in->Set(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT(), extent, 6);
+  }
+  return 1;
+}
+
+//----------------------------------------------------------------------------
+void vtkUltrasoundEmbedder::ExecuteSlab(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress)
+{
+  echorama::EmbedSlabs& slabs = this->PrepareSlabs(inputs, progress.Part(0.0, 0.1));
+  int wanted[6];
+  this->GetOutputInformation(0)->Get(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT(), wanted);
+  const echorama::ImageGeometry& grid = slabs.Grid();
+  const int first = wanted[4], count = wanted[5] - wanted[4] + 1, most = (grid.dimensions[2] + slabs.Slabs() - 1) / slabs.Slabs();
+  if (count > most) {
+    throw Error(Error::Kind::TooLarge, "embedding on a grid of " + echorama::SizeText(grid.dimensions) +
+                                           " voxels needs more memory than is allowed (MaximumMemoryGb); it can be made in " +
+                                           std::to_string(slabs.Slabs()) +
+                                           " slabs (echorama embed, or NumberOfSlabs of the writer)");
+  }
+  for (auto [from, to] = slabs.Missing(first, first + count); from < to;) {
+    const int some = std::min(slabs.SlicesAtATime(), to - from);
+    this->ShowSlices(this->InputSlices(from, some), [&, at = from](const void* intensity, const unsigned char* region) {
+      slabs.Take(at, some, intensity, region);
+    });
+    from += some;
+    progress(0.1);
+  }
+  const echorama::BackgroundNoise& noise = slabs.Noise();
+  this->SpeckleShare = this->Values->matchGrain ? noise.speckleShare : -1.0;
+  this->SpeckleGrains = this->Values->matchGrain ? noise.grains : -1.0;
+  this->GrainMm = noise.grainMm;
+  this->UsedFeatherMm = slabs.FeatherMm();
+  this->Notes =
+      "It is made slab by slab: the outline and the levels come from a coarse copy of the data.\n" + this->NoteOfNoise(noise);
+
+  output->Initialize();
+  output->GetFieldData()->ShallowCopy(vtkImageData::GetData(inputs[0])->GetFieldData());
+  vtkUltrasoundVolume::SetGeometry(output, grid);
+  int extent[6] = {0, grid.dimensions[0] - 1, 0, grid.dimensions[1] - 1, wanted[4], wanted[5]};
+  output->SetExtent(extent);
+  vtkUltrasoundAcquisition::SetProbeGeometry(output, slabs.Form().geometry);
+  vtkUltrasoundAcquisition::SetProbeToWorld(output, slabs.Form().probeToWorld);
+  vtkDataArray* intensity = AddArray(output, this->SlabName.c_str(), this->SlabType);
+  output->GetPointData()->SetActiveScalars(this->SlabName.c_str());
+  const auto bytesOf = [&](const char* name) {
+    return vtkUltrasoundVolume::ViewOf<unsigned char>(AddArray(output, name, VTK_UNSIGNED_CHAR), output).Data();
+  };
+  unsigned char* const seen = bytesOf(vtkUltrasoundVolume::ValidRegionName());
+  slabs.Render(first, count, intensity->GetVoidPointer(0), seen, bytesOf(vtkUltrasoundVolume::EmbeddingName()),
+               progress.Part(0.1, 1.0));
+}
+
+//----------------------------------------------------------------------------
+int vtkUltrasoundEmbedder::GetSlabs() const
+{
+  return this->Slabs ? this->Slabs->Slabs() : 1;
 }
 
 //----------------------------------------------------------------------------
@@ -185,6 +402,23 @@ const vtkUltrasoundEmbedder::Plan& vtkUltrasoundEmbedder::Prepare(vtkInformation
 }
 
 //----------------------------------------------------------------------------
+std::string vtkUltrasoundEmbedder::NoteOfNoise(const echorama::BackgroundNoise& behind)
+{
+  if (this->GetEnoughSpeckle() && this->SpeckleGrains >= 0.0) {
+    return "The noise is made, with the grain of the data: " + Rounded(behind.grainMm) + " mm, measured on " +
+           Rounded(behind.grains) + " grains in " + Rounded(100.0 * behind.speckleShare) + "% of them.";
+  }
+  if (this->SpeckleGrains < 0.0) {
+    return "The noise is made.";
+  }
+  this->Warning = "the data have too little speckle to tell its grain and brightness from (" + Rounded(behind.grains) +
+                  " grains; " + Rounded(echorama::NoiseMatch::leastGrains) +
+                  " are needed): the background is a guess, with grains of two by three voxels. Give noise volumes of the "
+                  "same scanner, or stitch views that hold more tissue";
+  return "The noise is made, with a grain of its own" + (behind.reason.empty() ? "" : ": " + behind.reason) + ".";
+}
+
+//----------------------------------------------------------------------------
 void vtkUltrasoundEmbedder::MakeNoise(vtkInformationVector** inputs, const Plan& plan, VolumeView<float> noise,
                                       VolumeView<unsigned char> form, const echorama::Progress& progress)
 {
@@ -208,25 +442,14 @@ void vtkUltrasoundEmbedder::MakeNoise(vtkInformationVector** inputs, const Plan&
     this->SpeckleShare = behind.speckleShare;
     this->SpeckleGrains = behind.grains;
     this->GrainMm = behind.grainMm;
-    if (this->GetEnoughSpeckle()) {
-      note += ", with the grain of the data: " + Rounded(behind.grainMm) + " mm, measured on " + Rounded(behind.grains) +
-              " grains in " + Rounded(100.0 * behind.speckleShare) + "% of them.";
-    } else {
-      note += ", with a grain of its own" + (behind.reason.empty() ? "" : ": " + behind.reason) + ".";
-      this->Warning = "the data have too little speckle to tell its grain and brightness from (" + Rounded(behind.grains) +
-                      " grains; " + Rounded(echorama::NoiseMatch::leastGrains) +
-                      " are needed): the background is a guess, with grains of two by three voxels. Give noise volumes of the "
-                      "same scanner, or stitch views that hold more tissue";
-    }
+    note = this->NoteOfNoise(behind);
   } else {
     note += ".";
   }
   parameters.seed = this->Values->seed;
-  {
-    const Volume<float> beams = echorama::MakeBeamNoise(parameters, plan.Form.geometry, progress.Part(0.4, 0.6));
-    echorama::ScanConvert<float>(beams.View(), plan.Form.geometry, plan.Form.probeToWorld, grid, noise, form,
-                                 progress.Part(0.6, 0.8));
-  }
+  parameters =
+      echorama::ResolvingCounts(parameters, plan.Form.geometry, 3.0, std::max(16e6, static_cast<double>(grid.VoxelCount())));
+  echorama::FillFanWithNoise(parameters, plan.Form, grid, noise, form, progress.Part(0.4, 0.8));
 
   // 2. real noise in its place, wherever there is any
   if (!volumes.empty()) {
@@ -256,6 +479,14 @@ void vtkUltrasoundEmbedder::Execute(vtkInformationVector** inputs, vtkImageData*
   this->Warning.clear();
   this->SpeckleShare = this->SpeckleGrains = -1.0;
   this->GrainMm = 0.0;
+  if (this->Slabs) {
+    this->ExecuteSlab(inputs, output, progress);
+    if (!this->Warning.empty() && !this->Warned) {
+      vtkWarningMacro(<< this->Warning);
+      this->Warned = true;
+    }
+    return;
+  }
   vtkImageData* image = vtkImageData::GetData(inputs[0]);
   const auto input = vtkUltrasoundVolume::CheckInput(this, image, "the input");
   const Plan& plan = this->Prepare(inputs, progress.Part(0.0, 0.1));
@@ -270,10 +501,10 @@ void vtkUltrasoundEmbedder::Execute(vtkInformationVector** inputs, vtkImageData*
       bytes += static_cast<double>(grid.VoxelCount()) * array->GetDataTypeSize() * array->GetNumberOfComponents();
     }
   }
-  if (bytes > echorama::FreeMemory()) {
+  if (bytes > this->AllowedBytes()) {
     throw Error(Error::Kind::TooLarge, "embedding on a grid of " + echorama::SizeText(grid.dimensions) + " voxels needs " +
                                            std::to_string(bytes / 1e9).substr(0, 5) +
-                                           " GB, more than there is free; a PreviewFactor of 2 needs an eighth of it");
+                                           " GB, more than there is free or allowed; a PreviewFactor of 2 needs an eighth of it");
   }
 
   // 1. the data on the grid

@@ -17,6 +17,10 @@
  * gets them (vtkUltrasoundToneMapper); the border of the data fades into it (vtkUltrasoundFeather). Grain is measured in
  * developed speckle alone; where there is too little of it a warning says so.
  *
+ * A volume that needs more memory than is allowed (MaximumMemoryGb) is embedded slab by slab, as its output is asked for, from
+ * an input that makes its slices as they are asked for (vtkUltrasoundReader, vtkUltrasoundStitcher): the outline, the grain and
+ * the levels of the background are found from a coarse copy. Only intensities and their valid region are kept then.
+ *
  * Fails when nothing of the volume is valid, when it was embedded before (mixed voxels would pass as data), when no fan is known
  * of a noise volume, and when memory does not suffice.
  *
@@ -35,9 +39,14 @@
 #include "Core/Geometry/ProbeGeometry.h"
 #include "EmbedGrid.h"
 #include <array>
+#include <functional>
 #include <memory> // for what is set
 #include <optional>
 #include <utility>
+namespace echorama {
+class EmbedSlabs;
+struct BackgroundNoise;
+} // namespace echorama
 #endif
 
 #include <string>
@@ -127,6 +136,12 @@ public:
   vtkUltrasoundIntegerMacro(PreviewFactor);
 
   /**
+   * What may be used, in 10^9 bytes. A volume that needs more is embedded slab by slab, as its output is asked for. 0: the memory
+   * that is free. At least 0 GB; default 0.
+   */
+  vtkUltrasoundNumberMacro(MaximumMemoryGb);
+
+  /**
    * Any parameter by its name: as a number (of a switch 0 or 1, of a choice its place from 0), as text ("1.5", "on", the name of
    * a choice, "1 0 0"), integers and vectors without a loss. Setting returns false, after an error event, when there is no such
    * parameter or value. GetParameterDescriptions tells what parameters there are, as JSON: an array of objects with name, type,
@@ -153,6 +168,15 @@ public:
    */
   bool GetEnoughSpeckle() const;
 
+  /**
+   * In how many slabs, along z, the output has to be asked for (NumberOfSlabs of the writer), as known after UpdateInformation: 1
+   * for a volume that fits into the memory as a whole.
+   */
+  int GetSlabs() const;
+
+  /** Whether the volume will be embedded slab by slab; it is not read for that, but for its header. */
+  bool IsLargerThanMemory();
+
   /** The depth of the feather of the last volume, mm: FeatherMm, or what took its place. */
   double GetUsedFeatherMm() const { return this->UsedFeatherMm; }
 
@@ -166,6 +190,7 @@ protected:
 
   int FillInputPortInformation(int port, vtkInformation* info) override;
   int RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
+  int RequestUpdateExtent(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) override;
 #ifndef __VTK_WRAP__
   void Execute(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress) override;
 #endif
@@ -185,6 +210,7 @@ private:
     std::string Note;
   };
   const Plan& Prepare(vtkInformationVector** inputs, const echorama::Progress& progress);
+  std::string NoteOfNoise(const echorama::BackgroundNoise& behind);
   void MakeNoise(vtkInformationVector** inputs, const Plan& plan, echorama::VolumeView<float> noise,
                  echorama::VolumeView<unsigned char> form, const echorama::Progress& progress);
 
@@ -192,6 +218,19 @@ private:
   using PlanKey = std::array<std::pair<const void*, vtkMTimeType>, 3>;
   std::optional<Plan> Planned;
   PlanKey PlannedFor{};
+
+  // What is larger than the memory.
+  using SlicesUse = std::function<void(const void* intensity, const unsigned char* region)>;
+  double AllowedBytes() const;
+  bool IsLarge();
+  vtkImageData* InputSlices(int first, int count);
+  void ShowSlices(vtkImageData* slices, const SlicesUse& use);
+  echorama::EmbedSlabs& PrepareSlabs(vtkInformationVector** inputs, const echorama::Progress& progress);
+  void ExecuteSlab(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress);
+  std::unique_ptr<echorama::EmbedSlabs> Slabs;
+  std::string SlabName;
+  int SlabType = 0;
+  bool Warned = false;
 #endif
   std::string Notes, Warning;
   double SpeckleGrains = -1.0, SpeckleShare = -1.0;

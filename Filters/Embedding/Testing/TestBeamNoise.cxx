@@ -231,6 +231,27 @@ TEST(BeamNoise, DependsOnTheSeedAndNotOnThreads)
   EXPECT_NE(one, make(1));
 }
 
+TEST(BeamNoise, APartIsThatOfTheWhole)
+{
+  const BeamNoiseParameters p = WithLengths(Small(NoiseIntensity::LogCompressed), 2.0, 1.4, 1.0);
+  const Volume<float> whole = MakeBeamNoise(p, convex);
+  const std::array<int, 3> all = BeamNoiseSize(p, convex);
+  ASSERT_EQ(whole.Dimensions(), all);
+  for (const int odd : {0, 1}) {
+    const std::array<int, 3> first{16 + odd, 31, 5}, size{67, 40, 9};
+    const Volume<float> part = MakeBeamNoise(p, convex, first, size);
+    ASSERT_EQ(part.Dimensions(), size);
+    int wrong = 0;
+    for (int k = 0; k < size[2]; ++k)
+      for (int j = 0; j < size[1]; ++j)
+        for (int i = 0; i < size[0]; ++i)
+          wrong += part.View()(i, j, k) != whole.View()(i + first[0], j + first[1], k + first[2]);
+    EXPECT_EQ(wrong, 0) << odd;
+  }
+  EXPECT_THROW(MakeBeamNoise(p, convex, {0, 0, 0}, {all[0], all[1], all[2] + 1}), Error);
+  EXPECT_THROW(MakeBeamNoise(p, convex, {-1, 0, 0}, {2, 2, 2}), Error);
+}
+
 TEST(BeamNoise, OtherLengthsSmoothTheSameNoise)
 {
   const Volume<float> rough = MakeBeamNoise(WithLengths(Small(), 0.9, 0.9, 0.9), convex);

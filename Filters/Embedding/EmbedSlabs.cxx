@@ -1,0 +1,382 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The grid is the coarse one with factor^3 voxels in the place of each. A slab is made in bricks with a halo, whose width is that
+// of the windows in which the noise loses its own levels: so what they share with their neighbours comes out as that of these.
+#include "EmbedSlabs.h"
+#include "Core/Base/Error.h"
+#include "Core/Base/FormatText.h"
+#include "Core/Base/Parallel.h"
+#include "Core/Imaging/ScanConversion.h"
+#include "Core/Imaging/VoxelTypes.h"
+#include "EmbedGrid.h"
+#include "FanNoise.h"
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <vector>
+
+namespace echorama {
+
+namespace {
+
+constexpr int brickEdge = 256; // voxels along x and y, without the halo
+constexpr int grainEdge = 160; // of the brick on which the grain is measured
+constexpr int leastSlices = 8; // of a slab
+constexpr int mostSlices = 256;
+
+std::string Gigabytes(double bytes)
+{
+  return Format("%.2f GB", bytes / 1e9);
+}
+
+template <class T>
+class SlabsOf : public EmbedSlabs {
+public:
+  SlabsOf(const Settings& settings, const ImageGeometry& data) : EmbedSlabs(settings, data)
+  {
+    CheckRanges(settings_.embed.featherMm < 0.0 ? WithoutFeather() : settings_.embed);
+    data.Check("the volume");
+    if (*std::min_element(data.dimensions.begin(), data.dimensions.end()) < 2)
+      throw Error(Error::Kind::BadInput, "embedding by slabs: it takes a volume of several slices");
+    // As fine as the memory allows, and no coarser than the windows of local statistics can bear.
+    const int most = static_cast<int>(settings.embed.smoothMm / 3.0 / data.spacing.maxCoeff());
+    for (factor_ = 2; factor_ < most && CoarseBytes() > 0.5 * settings.bytes; ++factor_) {
+    }
+    if (CoarseBytes() > settings.bytes)
+      throw Error(Error::Kind::TooLarge, "embedding by slabs needs " + Gigabytes(CoarseBytes()) +
+                                             " to look at all of the volume, and " + Gigabytes(settings.bytes) + " are allowed");
+    const auto& n = data.dimensions;
+    const double sliceBytes = static_cast<double>(n[0]) * n[1] * (sizeof(T) + 1.0);
+    slicesAtATime_ = std::clamp(static_cast<int>(0.2 * settings.bytes / sliceBytes), 1, std::min(64, n[2]));
+    coarse_ = data;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      coarse_.dimensions[axis] = (n[axis] + factor_ - 1) / factor_;
+      first_[axis] = n[axis];
+    }
+    const int start = (factor_ - 1) / 2;
+    coarse_.spacing *= factor_;
+    coarse_.origin = data.IndexToWorld() * Eigen::Vector3d(start, start, start);
+    sample_ = Volume<T>(coarse_.dimensions);
+    isSampleReal_ = Volume<unsigned char>(coarse_.dimensions);
+    isAnyReal_ = Volume<unsigned char>(coarse_.dimensions);
+  }
+
+  void Look(int first, int count, const void* intensity, const unsigned char* region) override
+  {
+    const auto& n = data_.dimensions;
+    const VolumeView<const T> voxels(static_cast<const T*>(intensity), {n[0], n[1], count});
+    const VolumeView<const unsigned char> real(region, {n[0], n[1], count});
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    double all = 0.0;
+    for (int k = 0; k < count; ++k) {
+      const int K = (first + k) / factor_;
+      const bool isSampled = first + k == SampleIn(K, 2);
+      for (int j = 0; j < n[1]; ++j) {
+        const unsigned char* const row = real.Row(j, k);
+        const auto begin = std::find_if(row, row + n[0], [](unsigned char each) { return each != 0; });
+        if (begin == row + n[0])
+          continue;
+        unsigned char* const any = isAnyReal_.View().Row(j / factor_, K);
+        int last = 0, inRow = 0;
+        for (int i = static_cast<int>(begin - row); i < n[0]; ++i)
+          if (row[i]) {
+            any[i / factor_] = 1;
+            last = i;
+            ++inRow;
+          }
+        first_ = {std::min(first_[0], static_cast<int>(begin - row)), std::min(first_[1], j), std::min(first_[2], first + k)};
+        last_ = {std::max(last_[0], last), std::max(last_[1], j), std::max(last_[2], first + k)};
+        sum += inRow * Eigen::Vector3d(0.5 * (static_cast<double>(begin - row) + last), j, k);
+        all += inRow;
+        if (isSampled && j == SampleIn(j / factor_, 1))
+          for (int I = 0; I < coarse_.dimensions[0]; ++I) {
+            sample_.View()(I, j / factor_, K) = voxels(SampleIn(I, 0), j, k);
+            isSampleReal_.View()(I, j / factor_, K) = row[SampleIn(I, 0)];
+          }
+      }
+    }
+    if (all > mostReal_) {
+      mostReal_ = all;
+      KeepGrain(first, voxels, real, sum / all);
+    }
+  }
+
+  void Plan(const Progress& progress) override
+  {
+    if (last_[0] < 0)
+      throw Error(Error::Kind::BadInput, "embedding: no voxel of the data is valid");
+    form_ = EncloseRegion(std::as_const(isAnyReal_).View(), coarse_, settings_.enclosing, progress.Part(0.0, 0.2));
+    isAnyReal_ = Volume<unsigned char>();
+    std::array<int, 3> first{}, last{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      first[axis] = first_[axis] / factor_;
+      last[axis] = last_[axis] / factor_;
+    }
+    const EmbedGrid grid = EmbedGridOf(coarse_, first, last, form_);
+    grid_ = data_;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      offset_[axis] = factor_ * grid.offset[axis];
+      grid_.dimensions[axis] = factor_ * grid.geometry.dimensions[axis];
+    }
+    grid_.origin = data_.IndexToWorld() * Eigen::Vector3d(-offset_[0], -offset_[1], -offset_[2]);
+    for (slices_ = mostSlices; slices_ > leastSlices && SlabBytes(slices_) > settings_.bytes; slices_ = slices_ * 3 / 4) {
+    }
+    slices_ = std::max(slices_, leastSlices);
+    if (SlabBytes(slices_) > settings_.bytes)
+      throw Error(Error::Kind::TooLarge, "embedding by slabs needs " + Gigabytes(SlabBytes(slices_)) + " on a grid of " +
+                                             SizeText(grid_.dimensions) + " voxels, and " + Gigabytes(settings_.bytes) +
+                                             " are allowed");
+    slabs_ = (grid_.dimensions[2] + slices_ - 1) / slices_;
+    MeasureGrain(progress.Part(0.2, 0.4));
+    FindLevels(grid, progress.Part(0.4, 1.0));
+  }
+
+  std::pair<int, int> Missing(int first, int end) const override
+  {
+    const auto [from, to] = Needed(first, end);
+    return there_.first <= from && from < there_.second ? std::pair(std::max(from, there_.second), std::max(to, there_.second))
+                                                        : std::pair(from, to);
+  }
+
+  void Take(int first, int count, const void* intensity, const unsigned char* region) override
+  {
+    if (first != there_.second) { // what is there is of no use beside it
+      held_.clear();
+      there_ = {first, first};
+    }
+    const auto size = static_cast<std::ptrdiff_t>(SliceSize());
+    for (int k = 0; k < count; ++k) {
+      const T* const voxels = static_cast<const T*>(intensity) + size * k;
+      held_.push_back({{voxels, voxels + size}, {region + size * k, region + size * (k + 1)}});
+    }
+    there_.second = first + count;
+  }
+
+  void Render(int first, int count, void* intensity, unsigned char* region, unsigned char* labels,
+              const Progress& progress) override
+  {
+    const auto [from, to] = Needed(first, first + count);
+    if (from < to && (there_.first > from || there_.second < to))
+      throw Error(Error::Kind::InvalidParameter, "embedding by slabs: slices of the data are missing");
+    Forget(from);
+    const auto& n = grid_.dimensions;
+    const std::array<int, 3> size{n[0], n[1], count};
+    const VolumeView<T> out(static_cast<T*>(intensity), size);
+    const VolumeView<unsigned char> real(region, size), what(labels, size);
+    const int across = (n[0] + brickEdge - 1) / brickEdge, bricks = across * ((n[1] + brickEdge - 1) / brickEdge);
+    for (int b = 0; b < bricks; ++b) {
+      const std::array<int, 3> at{b % across * brickEdge, b / across * brickEdge, first};
+      const std::array<int, 3> edge{std::min(brickEdge, n[0] - at[0]), std::min(brickEdge, n[1] - at[1]), count};
+      RenderBrick(at, edge, first, out, real, what, progress.Part(static_cast<double>(b) / bricks, (b + 1.0) / bricks));
+    }
+    progress(1.0);
+  }
+
+private:
+  struct Slice {
+    std::vector<T> voxels;
+    std::vector<unsigned char> isReal;
+  };
+
+  EmbedParameters WithoutFeather() const
+  {
+    EmbedParameters p = settings_.embed;
+    p.featherMm = 0.0;
+    return p;
+  }
+  std::size_t SliceSize() const
+  {
+    return static_cast<std::size_t>(data_.dimensions[0]) * static_cast<std::size_t>(data_.dimensions[1]);
+  }
+  int SampleIn(int cell, std::size_t axis) const
+  {
+    return std::min(factor_ * cell + (factor_ - 1) / 2, data_.dimensions[axis] - 1);
+  }
+  int Halo(std::size_t axis) const
+  {
+    return static_cast<int>(std::ceil(HaloMm(settings_.embed) / data_.spacing[static_cast<Eigen::Index>(axis)])) + 2;
+  }
+
+  // What looking takes; a grid around the data is taken to be up to twice as large.
+  double CoarseBytes() const
+  {
+    ImageGeometry grid = data_;
+    grid.spacing *= factor_;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      grid.dimensions[axis] = (data_.dimensions[axis] + factor_ - 1) / factor_ * 5 / 4 + 1;
+    return EmbedMemory(WithoutFeather(), grid) + static_cast<double>(grid.VoxelCount()) * (2.0 * sizeof(T) + 4.0);
+  }
+
+  // What making a slab takes: slices of the data, the slab, and a brick.
+  double SlabBytes(int slices) const
+  {
+    const auto& n = grid_.dimensions;
+    ImageGeometry brick = grid_;
+    brick.dimensions = {std::min(n[0], brickEdge + 2 * Halo(0)), std::min(n[1], brickEdge + 2 * Halo(1)),
+                        std::min(n[2], slices + 2 * Halo(2))};
+    const double held =
+        static_cast<double>(SliceSize()) * std::min(data_.dimensions[2], slices + 2 * Halo(2)) * (sizeof(T) + 1.0);
+    return held + static_cast<double>(SliceSize()) * slicesAtATime_ * (sizeof(T) + 1.0) +
+           static_cast<double>(n[0]) * n[1] * slices * (sizeof(T) + 2.0) + EmbedMemory(WithoutFeather(), brick) +
+           static_cast<double>(brick.VoxelCount()) * (sizeof(T) + 6.0);
+  }
+
+  // Slices of the data that slices of the grid are made of.
+  std::pair<int, int> Needed(int first, int end) const
+  {
+    const int from = std::clamp(first - Halo(2) - offset_[2], 0, data_.dimensions[2]);
+    return {from, std::max(from, std::clamp(end + Halo(2) - offset_[2], 0, data_.dimensions[2]))};
+  }
+
+  void Forget(int before)
+  {
+    for (; there_.first < std::min(before, there_.second); ++there_.first)
+      held_.pop_front();
+  }
+
+  void KeepGrain(int first, VolumeView<const T> voxels, VolumeView<const unsigned char> real, const Eigen::Vector3d& middle)
+  {
+    std::array<int, 3> at{}, size{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const int all = voxels.Dimensions()[axis];
+      size[axis] = std::min(grainEdge, all);
+      at[axis] = std::clamp(static_cast<int>(middle[static_cast<Eigen::Index>(axis)]) - size[axis] / 2, 0, all - size[axis]);
+    }
+    grain_ = Volume<T>(size);
+    isGrainReal_ = Volume<unsigned char>(size);
+    for (int k = 0; k < size[2]; ++k)
+      for (int j = 0; j < size[1]; ++j) {
+        std::copy_n(voxels.Row(j + at[1], k + at[2]) + at[0], size[0], grain_.View().Row(j, k));
+        std::copy_n(real.Row(j + at[1], k + at[2]) + at[0], size[0], isGrainReal_.View().Row(j, k));
+      }
+    grainPlace_ = data_;
+    grainPlace_.dimensions = size;
+    grainPlace_.origin = data_.IndexToWorld() * Eigen::Vector3d(at[0], at[1], first + at[2]);
+  }
+
+  // Along parallel beams that go as those of the form do in the middle of the part.
+  void MeasureGrain(const Progress& progress)
+  {
+    BeamNoiseParameters& p = noise_.parameters;
+    p.depthCorrelationMm = std::min(p.depthCorrelationMm, 0.25 * (form_.geometry.depthMax - form_.geometry.depthMin));
+    if (settings_.matchGrain) {
+      const Eigen::Vector3d centre = grainPlace_.Centre();
+      const auto beam = BeamPointAt(form_.geometry, form_.probeToWorld.inverse() * centre);
+      const Eigen::Vector3d along =
+          form_.probeToWorld.linear() * (beam ? DirectionOf(form_.geometry, *beam) : Eigen::Vector3d(Eigen::Vector3d::UnitZ()));
+      const Eigen::Vector3d aside = along.cross(form_.probeToWorld.linear().col(0)).normalized();
+      PlacedProbe box;
+      box.probeToWorld.linear() << aside.cross(along), aside, along;
+      const Eigen::Matrix3d edges =
+          box.probeToWorld.linear().transpose() * grainPlace_.direction * grainPlace_.spacing.asDiagonal();
+      const Eigen::Vector3d extent =
+          edges.cwiseAbs() * Eigen::Vector3d(grainPlace_.dimensions[0], grainPlace_.dimensions[1], grainPlace_.dimensions[2]);
+      box.geometry = ProbeGeometry::Linear(extent[0], extent[1], 0.0, extent[2]);
+      box.probeToWorld.translation() = centre - 0.5 * extent[2] * along;
+      noise_ =
+          NoiseBehind<T>({std::as_const(grain_).View(), std::as_const(isGrainReal_).View(), grainPlace_}, form_, progress, &box);
+    }
+    p.seed = settings_.seed;
+    p = ResolvingCounts(p, form_.geometry, 3.0, std::max(16e6, static_cast<double>(grid_.VoxelCount())));
+    if (settings_.embed.featherMm < 0.0)
+      settings_.embed.featherMm = FeatherDepth(noise_.grainMm, data_.spacing);
+    grain_ = Volume<T>();
+    isGrainReal_ = Volume<unsigned char>();
+  }
+
+  void FindLevels(const EmbedGrid& grid, const Progress& progress)
+  {
+    const auto& n = grid.geometry.dimensions;
+    Volume<T> intensity(n);
+    Volume<unsigned char> region(n), form(n);
+    CopyToGrid(grid, coarse_.dimensions, sizeof(T), sample_.View().Data(), intensity.View().Data());
+    CopyToGrid(grid, coarse_.dimensions, 1, isSampleReal_.View().Data(), region.View().Data());
+    sample_ = Volume<T>();
+    isSampleReal_ = Volume<unsigned char>();
+    {
+      const Volume<float> corners({2, 2, form_.geometry.IsPlane() ? 1 : 2}); // for what lies between them
+      Volume<float> nothing(n);
+      ScanConvert<float>(corners.View(), form_.geometry, form_.probeToWorld, grid.geometry, nothing.View(), form.View(),
+                         progress.Part(0.0, 0.2));
+    }
+    levels_ = LevelsAround<T>(settings_.embed, std::as_const(region).View(), grid.geometry.spacing, std::as_const(form).View(),
+                              std::as_const(intensity).View(), progress.Part(0.2, 1.0));
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      levels_.blocks.size[axis] *= factor_;
+    levels_.blocks.voxels = grid_.dimensions;
+  }
+
+  void RenderBrick(const std::array<int, 3>& at, const std::array<int, 3>& edge, int firstSlice, VolumeView<T> out,
+                   VolumeView<unsigned char> real, VolumeView<unsigned char> what, const Progress& progress)
+  {
+    std::array<int, 3> begin{}, size{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      begin[axis] = std::max(0, at[axis] - Halo(axis));
+      size[axis] = std::min(grid_.dimensions[axis], at[axis] + edge[axis] + Halo(axis)) - begin[axis];
+    }
+    Volume<T> intensity(size);
+    Volume<unsigned char> region(size), labels(size), form(size);
+    ParallelFor(size[2], [&](std::ptrdiff_t slice) {
+      const int k = static_cast<int>(slice), z = k + begin[2] - offset_[2];
+      const int x = begin[0] - offset_[0], skip = std::max(0, -x), count = std::min(size[0], data_.dimensions[0] - x) - skip;
+      for (int j = 0; j < size[1]; ++j) {
+        const int y = j + begin[1] - offset_[1];
+        if (z < 0 || z >= data_.dimensions[2] || y < 0 || y >= data_.dimensions[1] || count <= 0)
+          continue;
+        const Slice& held = held_[static_cast<std::size_t>(z - there_.first)];
+        const auto from = static_cast<std::ptrdiff_t>(data_.dimensions[0]) * y + x + skip;
+        const auto isReal = held.isReal.begin() + from;
+        std::copy_n(isReal, count, region.View().Row(j, k) + skip);
+        std::transform(held.voxels.begin() + from, held.voxels.begin() + from + count, isReal, intensity.View().Row(j, k) + skip,
+                       [](T value, unsigned char counts) { return counts ? value : T(0); });
+      }
+    });
+    {
+      ImageGeometry its = grid_;
+      its.origin = grid_.IndexToWorld() * Eigen::Vector3d(begin[0], begin[1], begin[2]);
+      its.dimensions = size;
+      Volume<float> noise(size);
+      FillFanWithNoise(noise_.parameters, form_, its, noise.View(), form.View(), progress.Part(0.0, 0.5));
+      EmbedPart<T>(settings_.embed, levels_, begin, std::as_const(region).View(), data_.spacing, noise.View(),
+                   std::as_const(form).View(), intensity.View(), labels.View(), progress.Part(0.5, 1.0));
+    }
+    ParallelFor(edge[2], [&](std::ptrdiff_t slice) {
+      const int k = static_cast<int>(slice) + at[2];
+      for (int j = at[1]; j < at[1] + edge[1]; ++j) {
+        const int i = at[0] - begin[0], row = j - begin[1], from = k - begin[2], to = k - firstSlice;
+        std::copy_n(intensity.View().Row(row, from) + i, edge[0], out.Row(j, to) + at[0]);
+        std::copy_n(region.View().Row(row, from) + i, edge[0], real.Row(j, to) + at[0]);
+        std::copy_n(labels.View().Row(row, from) + i, edge[0], what.Row(j, to) + at[0]);
+      }
+    });
+  }
+
+  int factor_ = 2, slices_ = 1;
+  ImageGeometry coarse_;
+  Volume<T> sample_;
+  Volume<unsigned char> isSampleReal_, isAnyReal_; // of each cell: the sample, and whether any voxel is real
+  std::array<int, 3> first_{}, last_{-1, -1, -1};  // voxels of the data that are real
+  Volume<T> grain_;
+  Volume<unsigned char> isGrainReal_;
+  ImageGeometry grainPlace_;
+  double mostReal_ = 0.0;
+  std::array<int, 3> offset_{}; // where the data begin on the grid
+  EmbedLevels levels_;
+  std::deque<Slice> held_;
+  std::pair<int, int> there_{0, 0}; // slices of the data that are held, [first, second)
+};
+
+} // namespace
+
+template <class T>
+std::unique_ptr<EmbedSlabs> EmbedSlabs::Make(const Settings& settings, const ImageGeometry& data)
+{
+  return std::make_unique<SlabsOf<T>>(settings, data);
+}
+
+#define EchoramaInstantiate(T)                                                                                                   \
+  template std::unique_ptr<EmbedSlabs> EmbedSlabs::Make<T>(const EmbedSlabs::Settings&, const ImageGeometry&);
+ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
+#undef EchoramaInstantiate
+
+} // namespace echorama

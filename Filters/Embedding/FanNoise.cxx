@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// A part of the grid lies between the beams that pass near a lattice of points in it. The parts are halved until these are few
+// enough; close to where all beams meet that may take parts of a few voxels.
+#include "FanNoise.h"
+#include "Core/Base/Parallel.h"
+#include "Core/Imaging/ScanConversion.h"
+#include <algorithm>
+#include <cmath>
+#include <Eigen/Geometry>
+#include <vector>
+
+namespace echorama {
+
+namespace {
+
+struct Box {
+  std::array<int, 3> first{}, size{};
+  double Count() const { return static_cast<double>(size[0]) * size[1] * size[2]; }
+};
+
+constexpr int LeastPart = 4; // voxels along an edge
+
+ImageGeometry GridOf(const ImageGeometry& grid, const Box& part)
+{
+  ImageGeometry its = grid;
+  its.origin = grid.IndexToWorld() * Eigen::Vector3d(part.first[0], part.first[1], part.first[2]);
+  its.dimensions = part.size;
+  return its;
+}
+
+// The samples that a part of the grid lies between; none where it is beside the fan.
+Box BeamsAround(const PlacedProbe& fan, const std::array<int, 3>& all, const ImageGeometry& part)
+{
+  const ProbeGeometry& g = fan.geometry;
+  Box box{{0, 0, 0}, all};
+  const Eigen::Affine3d toProbe = fan.probeToWorld.inverse() * part.IndexToWorld();
+  Eigen::AlignedBox3d range;
+  constexpr int steps = 8;
+  for (int c = 0; c <= steps; ++c)
+    for (int b = 0; b <= steps; ++b)
+      for (int a = 0; a <= steps; ++a) {
+        const Eigen::Vector3d share = Eigen::Vector3d(a, b, c) / steps;
+        const Eigen::Vector3d last(part.dimensions[0] - 1, part.dimensions[1] - 1, part.dimensions[2] - 1);
+        const Eigen::Vector3d point = toProbe * share.cwiseProduct(last);
+        for (const bool behind : {false, g.ReachesBehindAxis()}) {
+          const ProbeArc::Place plane =
+              g.IsPlane() ? ProbeArc::Place{0.0, point.z()} : g.Sweep().PlaceOf(point.y(), point.z(), behind);
+          const ProbeArc::Place beam = g.Fan().PlaceOf(point.x(), plane.depth);
+          range.extend(Eigen::Vector3d((beam.depth - g.depthMin) / (g.depthMax - g.depthMin), beam.along - g.fanOffset + 0.5,
+                                       plane.along + 0.5));
+        }
+      }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto at = static_cast<Eigen::Index>(axis);
+    const double last = all[axis] - 1, margin = 2.0 + 0.5 / steps * range.sizes()[at] * last;
+    const double low = std::clamp(std::floor(range.min()[at] * last - margin), 0.0, last);
+    const double high = std::clamp(std::ceil(range.max()[at] * last + margin), 0.0, last);
+    if (range.max()[at] * last + margin < 0.0 || range.min()[at] * last - margin > last)
+      return {};
+    box.first[axis] = static_cast<int>(low);
+    box.size[axis] = static_cast<int>(high - low) + 1;
+    if (box.size[axis] < 2 && all[axis] > 1) { // between two at least
+      box.size[axis] = 2;
+      box.first[axis] = std::min(box.first[axis], all[axis] - 2);
+    }
+  }
+  return box;
+}
+
+} // namespace
+
+void FillFanWithNoise(const BeamNoiseParameters& parameters, const PlacedProbe& fan, const ImageGeometry& grid,
+                      VolumeView<float> noise, VolumeView<unsigned char> inside, const Progress& progress, double most)
+{
+  const std::array<int, 3> all = BeamNoiseSize(parameters, fan.geometry);
+  if (Box{{}, all}.Count() <= most) {
+    const Volume<float> beams = MakeBeamNoise(parameters, fan.geometry, progress.Part(0.0, 0.5));
+    ScanConvert<float>(beams.View(), fan.geometry, fan.probeToWorld, grid, noise, inside, progress.Part(0.5, 1.0));
+    return;
+  }
+  std::fill(noise.begin(), noise.end(), 0.0f);
+  std::fill(inside.begin(), inside.end(), static_cast<unsigned char>(0));
+  std::vector<Box> parts{{{0, 0, 0}, grid.dimensions}};
+  const double voxels = parts[0].Count();
+  double done = 0.0;
+  while (!parts.empty()) {
+    progress(done / voxels);
+    const Box part = parts.back();
+    parts.pop_back();
+    const ImageGeometry its = GridOf(grid, part);
+    const Box beams = BeamsAround(fan, all, its);
+    const auto longest = static_cast<std::size_t>(std::max_element(part.size.begin(), part.size.end()) - part.size.begin());
+    if (beams.Count() > most && part.size[longest] > LeastPart) {
+      std::array<Box, 2> halves{part, part};
+      halves[0].size[longest] /= 2;
+      halves[1].first[longest] += halves[0].size[longest];
+      halves[1].size[longest] -= halves[0].size[longest];
+      parts.insert(parts.end(), halves.begin(), halves.end());
+      continue;
+    }
+    if (beams.Count() > 0.0) {
+      const Volume<float> samples = MakeBeamNoise(parameters, fan.geometry, beams.first, beams.size);
+      Volume<float> values(part.size);
+      Volume<unsigned char> there(part.size);
+      const BeamWindow window{all, beams.first};
+      ScanConvert<float>(samples.View(), fan.geometry, fan.probeToWorld, its, values.View(), there.View(), {}, &window);
+      ParallelFor(part.size[2], [&](std::ptrdiff_t slice) {
+        const int k = static_cast<int>(slice);
+        for (int j = 0; j < part.size[1]; ++j) {
+          std::copy_n(values.View().Row(j, k), part.size[0], noise.Row(j + part.first[1], k + part.first[2]) + part.first[0]);
+          std::copy_n(there.View().Row(j, k), part.size[0], inside.Row(j + part.first[1], k + part.first[2]) + part.first[0]);
+        }
+      });
+    }
+    done += part.Count();
+  }
+  progress(1.0);
+}
+
+} // namespace echorama
