@@ -140,6 +140,9 @@ void Embed(Session& session, const EmbedOptions& options, vtkUltrasoundEmbedder*
       return EmbedLarge(session, options, embedder);
     const LoadedVolume volume = LoadVolume(session, options.file);
     embedder->SetInputData(0, volume.image);
+    session.Watch(embedder, "plan", options.file, [&] { embedder->UpdateInformation(); });
+    if (embedder->GetSlabs() > 1) // the fan is so much larger than the data
+      return EmbedLarge(session, options, embedder);
     session.Update(embedder, "embed", options.file);
   } catch (const Error& error) {
     Fail(error, options, noise);

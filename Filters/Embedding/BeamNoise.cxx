@@ -302,6 +302,7 @@ std::array<int, 3> BeamNoiseSize(const BeamNoiseParameters& parameters, const Pr
 
 Volume<float> MakeBeamNoise(const BeamNoiseParameters& parameters, const ProbeGeometry& geometry, const Progress& progress)
 {
+  Check(parameters, geometry);
   const std::array<int, 3> size = BeamNoiseSize(parameters, geometry);
   CheckBeamVolume(size, geometry);
   return MakeBeamNoise(parameters, geometry, {0, 0, 0}, size, progress);

@@ -197,6 +197,11 @@ private:
     return static_cast<int>(std::ceil(HaloMm(settings_.embed) / data_.spacing[static_cast<Eigen::Index>(axis)])) + 2;
   }
 
+  int BlockSize(std::size_t axis) const // of local statistics
+  {
+    return Blocks(grid_.dimensions, grid_.spacing, settings_.embed.smoothMm / 1.5).size[axis];
+  }
+
   // What looking takes; a grid around the data is taken to be up to twice as large.
   double CoarseBytes() const
   {
@@ -212,10 +217,11 @@ private:
   {
     const auto& n = grid_.dimensions;
     ImageGeometry brick = grid_;
-    brick.dimensions = {std::min(n[0], brickEdge + 2 * Halo(0)), std::min(n[1], brickEdge + 2 * Halo(1)),
-                        std::min(n[2], slices + 2 * Halo(2))};
+    brick.dimensions = {std::min(n[0], brickEdge + 2 * Halo(0) + BlockSize(0)),
+                        std::min(n[1], brickEdge + 2 * Halo(1) + BlockSize(1)),
+                        std::min(n[2], slices + 2 * Halo(2) + BlockSize(2))};
     const double held =
-        static_cast<double>(SliceSize()) * std::min(data_.dimensions[2], slices + 2 * Halo(2)) * (sizeof(T) + 1.0);
+        static_cast<double>(SliceSize()) * std::min(data_.dimensions[2], slices + 2 * Halo(2) + BlockSize(2)) * (sizeof(T) + 1.0);
     return held + static_cast<double>(SliceSize()) * slicesAtATime_ * (sizeof(T) + 1.0) +
            static_cast<double>(n[0]) * n[1] * slices * (sizeof(T) + 2.0) + EmbedMemory(WithoutFeather(), brick) +
            static_cast<double>(brick.VoxelCount()) * (sizeof(T) + 6.0);
@@ -224,7 +230,7 @@ private:
   // Slices of the data that slices of the grid are made of.
   std::pair<int, int> Needed(int first, int end) const
   {
-    const int from = std::clamp(first - Halo(2) - offset_[2], 0, data_.dimensions[2]);
+    const int from = std::clamp(first - Halo(2) - BlockSize(2) - offset_[2], 0, data_.dimensions[2]);
     return {from, std::max(from, std::clamp(end + Halo(2) - offset_[2], 0, data_.dimensions[2]))};
   }
 
@@ -312,6 +318,7 @@ private:
     std::array<int, 3> begin{}, size{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       begin[axis] = std::max(0, at[axis] - Halo(axis));
+      begin[axis] -= begin[axis] % BlockSize(axis); // so that local statistics have the same blocks in all bricks
       size[axis] = std::min(grid_.dimensions[axis], at[axis] + edge[axis] + Halo(axis)) - begin[axis];
     }
     Volume<T> intensity(size);

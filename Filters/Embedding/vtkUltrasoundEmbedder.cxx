@@ -150,7 +150,9 @@ int vtkUltrasoundEmbedder::RequestInformation(vtkInformation*, vtkInformationVec
   return vtkUltrasoundVolume::Run(this, outputs, [this, inputs, outputs](const echorama::Progress&) {
     echorama::CheckRanges(this->Parameters());
     // It takes well below a second: a stop is left to the data, whose request takes it back.
-    vtkUltrasoundVolume::SetGeometry(outputs->GetInformationObject(0), this->Prepare(inputs, {}).Grid.geometry);
+    const echorama::ImageGeometry& grid = this->Prepare(inputs, {}).Grid.geometry;
+    const bool isLarge = this->BytesOn(grid, vtkImageData::GetData(inputs[0])) > this->AllowedBytes() && this->CanBeCut();
+    vtkUltrasoundVolume::SetGeometry(outputs->GetInformationObject(0), isLarge ? this->PrepareSlabs(inputs, {}).Grid() : grid);
   });
 }
 
@@ -162,31 +164,51 @@ double vtkUltrasoundEmbedder::AllowedBytes() const
 }
 
 //----------------------------------------------------------------------------
+double vtkUltrasoundEmbedder::BytesOn(const echorama::ImageGeometry& grid, vtkImageData* image) const
+{
+  echorama::EmbedParameters parameters = this->Values->embed;
+  parameters.featherMm = std::max(parameters.featherMm, 0.0);
+  double bytes = echorama::EmbedMemory(parameters, grid);
+  for (int i = 0; i < image->GetPointData()->GetNumberOfArrays(); ++i) {
+    if (vtkDataArray* array = image->GetPointData()->GetArray(i)) {
+      bytes += static_cast<double>(grid.VoxelCount()) * array->GetDataTypeSize() * array->GetNumberOfComponents();
+    }
+  }
+  return bytes;
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundEmbedder::CanBeCut()
+{
+  return this->GetNumberOfInputConnections(0) == 1 && this->GetNumberOfInputConnections(1) == 0 &&
+         this->Values->previewFactor == 1;
+}
+
+//----------------------------------------------------------------------------
 bool vtkUltrasoundEmbedder::IsLargerThanMemory()
 {
   int port = 0;
-  vtkAlgorithm* producer = this->GetNumberOfInputConnections(0) == 1 ? this->GetInputAlgorithm(0, 0, port) : nullptr;
-  return producer && producer->GetExecutive()->UpdateInformation() && this->IsLarge();
+  return this->CanBeCut() && this->GetInputAlgorithm(0, 0, port)->GetExecutive()->UpdateInformation() && this->IsLarge();
 }
 
 //----------------------------------------------------------------------------
 bool vtkUltrasoundEmbedder::IsLarge()
 {
-  int port = 0;
-  vtkInformation* input =
-      this->GetNumberOfInputConnections(0) == 1 ? this->GetInputAlgorithm(0, 0, port)->GetOutputInformation(port) : nullptr;
-  if (!input || !input->Has(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT()) || !input->Has(vtkDataObject::SPACING()) ||
-      this->Values->previewFactor > 1) {
+  if (!this->CanBeCut()) {
     return false;
   }
-  echorama::ImageGeometry grid;
-  int whole[6];
+  int port = 0, whole[6];
+  vtkInformation* input = this->GetInputAlgorithm(0, 0, port)->GetOutputInformation(port);
+  if (!input->Has(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT()) || !input->Has(vtkDataObject::SPACING())) {
+    return false;
+  }
   input->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), whole);
+  echorama::ImageGeometry grid;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     grid.dimensions[axis] = whole[2 * axis + 1] - whole[2 * axis] + 1;
-  }
-  if (*std::min_element(grid.dimensions.begin(), grid.dimensions.end()) < 2) {
-    return false;
+    if (grid.dimensions[axis] < 2) {
+      return false;
+    }
   }
   input->Get(vtkDataObject::SPACING(), grid.spacing.data());
   echorama::EmbedParameters parameters = this->Values->embed;
@@ -196,7 +218,7 @@ bool vtkUltrasoundEmbedder::IsLarge()
 }
 
 //----------------------------------------------------------------------------
-vtkImageData* vtkUltrasoundEmbedder::InputSlices(int first, int count)
+vtkSmartPointer<vtkImageData> vtkUltrasoundEmbedder::InputSlices(int first, int count)
 {
   int port = 0;
   vtkAlgorithm* producer = this->GetInputAlgorithm(0, 0, port);
@@ -208,10 +230,16 @@ vtkImageData* vtkUltrasoundEmbedder::InputSlices(int first, int count)
   requests->SetNumberOfInformationObjects(producer->GetNumberOfOutputPorts());
   requests->GetInformationObject(port)->Set(vtkStreamingDemandDrivenPipeline::UPDATE_EXTENT(), extent, 6);
   const bool made = producer->Update(port, requests) != 0;
-  vtkImageData* slices = made ? vtkImageData::SafeDownCast(producer->GetOutputDataObject(port)) : nullptr;
+  vtkSmartPointer<vtkImageData> slices = made ? vtkImageData::SafeDownCast(producer->GetOutputDataObject(port)) : nullptr;
   if (!slices || slices->GetNumberOfPoints() == 0) {
     throw Error(Error::Kind::BadInput,
                 "the input failed at slices " + std::to_string(first) + " to " + std::to_string(first + count - 1));
+  }
+  if (int there[6]; slices->GetExtent(there), !std::equal(there, there + 6, extent)) { // some make all, whatever is asked for
+    const vtkNew<vtkImageData> some;
+    some->ShallowCopy(slices);
+    some->Crop(extent);
+    slices = some.GetPointer();
   }
   return slices;
 }
@@ -244,10 +272,6 @@ echorama::EmbedSlabs& vtkUltrasoundEmbedder::PrepareSlabs(vtkInformationVector**
   this->Slabs.reset();
   this->Planned.reset();
   this->Warned = false;
-  if (this->GetNumberOfInputConnections(1) > 0) {
-    throw Error(Error::Kind::InvalidParameter,
-                "a volume that is larger than the memory cannot have noise volumes; its noise is made");
-  }
   int whole[6];
   producer->GetOutputInformation(port)->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), whole);
   const int slices = whole[5] - whole[4] + 1;
@@ -260,7 +284,7 @@ echorama::EmbedSlabs& vtkUltrasoundEmbedder::PrepareSlabs(vtkInformationVector**
   std::unique_ptr<echorama::EmbedSlabs> planned;
   for (int first = 0, count = 1; first < slices; first += count, count = planned->SlicesAtATime()) {
     count = std::min(count, slices - first);
-    vtkImageData* image = this->InputSlices(first, count);
+    const vtkSmartPointer<vtkImageData> image = this->InputSlices(first, count);
     if (!planned) {
       const auto input = vtkUltrasoundVolume::CheckInput(this, image, "the input");
       echorama::ImageGeometry data = vtkUltrasoundVolume::GeometryOf(image); // of its first slice
@@ -495,13 +519,7 @@ void vtkUltrasoundEmbedder::Execute(vtkInformationVector** inputs, vtkImageData*
 
   echorama::EmbedParameters parameters = this->Values->embed;
   parameters.featherMm = std::max(parameters.featherMm, 0.0);
-  double bytes = echorama::EmbedMemory(parameters, grid);
-  for (int i = 0; i < image->GetPointData()->GetNumberOfArrays(); ++i) {
-    if (vtkDataArray* array = image->GetPointData()->GetArray(i)) {
-      bytes += static_cast<double>(grid.VoxelCount()) * array->GetDataTypeSize() * array->GetNumberOfComponents();
-    }
-  }
-  if (bytes > this->AllowedBytes()) {
+  if (const double bytes = this->BytesOn(grid, image); bytes > this->AllowedBytes()) {
     throw Error(Error::Kind::TooLarge, "embedding on a grid of " + echorama::SizeText(grid.dimensions) + " voxels needs " +
                                            std::to_string(bytes / 1e9).substr(0, 5) +
                                            " GB, more than there is free or allowed; a PreviewFactor of 2 needs an eighth of it");

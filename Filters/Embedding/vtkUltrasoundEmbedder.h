@@ -50,6 +50,7 @@ struct BackgroundNoise;
 #endif
 
 #include <string>
+#include <vtkSmartPointer.h>
 
 class ECHORAMAFILTERSEMBEDDING_EXPORT vtkUltrasoundEmbedder : public vtkUltrasoundImageAlgorithm {
 public:
@@ -222,8 +223,10 @@ private:
   // What is larger than the memory.
   using SlicesUse = std::function<void(const void* intensity, const unsigned char* region)>;
   double AllowedBytes() const;
+  double BytesOn(const echorama::ImageGeometry& grid, vtkImageData* image) const;
+  bool CanBeCut(); // into slabs: one volume, with noise that is made
   bool IsLarge();
-  vtkImageData* InputSlices(int first, int count);
+  vtkSmartPointer<vtkImageData> InputSlices(int first, int count);
   void ShowSlices(vtkImageData* slices, const SlicesUse& use);
   echorama::EmbedSlabs& PrepareSlabs(vtkInformationVector** inputs, const echorama::Progress& progress);
   void ExecuteSlab(vtkInformationVector** inputs, vtkImageData* output, const echorama::Progress& progress);

@@ -140,8 +140,8 @@ TEST(EmbedSlabs, DoNotShowInTheResult)
     other += difference > 0;
     worst = std::max(worst, difference);
   }
-  EXPECT_LE(worst, 2);
-  EXPECT_LT(static_cast<double>(other), 0.1 * static_cast<double>(shown));
+  EXPECT_LE(worst, 1);
+  EXPECT_LT(static_cast<double>(other), 0.02 * static_cast<double>(shown));
 }
 
 // The levels and the grain of the background are those that Embed gives it as a whole.

@@ -21,15 +21,15 @@ TEST(FanNoise, PartsAreThoseOfTheWhole)
         ProbeGeometry::Convex(140 * degree, 40, 60 * degree, 20, 0, 60)}) { // the last one looks behind its axis
     SCOPED_TRACE(probe.fanAngle);
     BeamNoiseParameters p;
-    p.depthCorrelationMm = 2.0;
-    p.fanCorrelation = p.sweepCorrelation = 0.05;
+    p.depthCorrelationMm = 4.0;
+    p.fanCorrelation = p.sweepCorrelation = 0.1;
     p = ResolvingCounts(p, probe);
-    ImageGeometry grid = ScanConversionGrid(probe, turned, 1.3, 1u << 24);
+    ImageGeometry grid = ScanConversionGrid(probe, turned, 3.3, 1u << 24);
     grid.origin = grid.IndexToWorld() * Eigen::Vector3d(3, 2, 0);
     Volume<float> whole(grid.dimensions), parts(grid.dimensions, 7.0f);
     Volume<unsigned char> inside(grid.dimensions), inParts(grid.dimensions, 7);
     FillFanWithNoise(p, {probe, turned}, grid, whole.View(), inside.View());
-    FillFanWithNoise(p, {probe, turned}, grid, parts.View(), inParts.View(), {}, 2000.0);
+    FillFanWithNoise(p, {probe, turned}, grid, parts.View(), inParts.View(), {}, 8000.0);
     std::ptrdiff_t other = 0, shown = 0;
     double worst = 0.0;
     for (std::ptrdiff_t at = 0; at < whole.View().Size(); ++at) {

@@ -206,3 +206,50 @@ assert run(box(ValidRegion=np.zeros((40, 36, 44), np.uint8)))[0] is None
 assert run(box(ValidRegion=one.astype(np.int16)))[0] is None
 nothing = box(ValidRegion=np.zeros((40, 36, 44), np.uint8))
 assert run(box(), form=nothing)[0] is None
+
+# 9. What needs more memory than is allowed is made slab by slab: from a volume in memory, and from a file that is read by slices.
+shape = (90, 70, 240)
+long = box(shape=shape, ValidRegion=(np.indices(shape)[0] + np.indices(shape)[1] > 60).astype(np.uint8))
+whole, _ = run(long, FeatherMm=2)
+writer = echorama.vtkUltrasoundWriter()
+writer.SetFileName("long.mha")
+writer.SetInputData(long)
+assert writer.Write()
+reader = echorama.vtkUltrasoundReader()
+reader.SetFileName("long.mha")
+made = []
+for number, source in enumerate((None, reader)):
+    filter = echorama.vtkUltrasoundEmbedder()
+    if source:
+        filter.SetInputConnection(source.GetOutputPort())
+    else:
+        filter.SetInputData(long)
+    filter.SetFeatherMm(2)
+    assert not filter.IsLargerThanMemory()
+    filter.SetMaximumMemoryGb(0.38)
+    assert filter.IsLargerThanMemory()
+    filter.UpdateInformation()
+    slabs = filter.GetSlabs()
+    assert slabs > 3, slabs
+    writer = echorama.vtkUltrasoundWriter()
+    writer.SetFileName(f"embedded{number}.mha")
+    writer.SetInputConnection(filter.GetOutputPort())
+    writer.SetNumberOfSlabs(slabs)
+    assert writer.Write()
+    assert "slab by slab" in filter.GetNotes() and filter.GetUsedFeatherMm() == 2
+    back = echorama.vtkUltrasoundReader()
+    back.SetFileName(f"embedded{number}.mha")
+    back.Update()
+    made.append(back.GetOutput())
+    _, labels = check(long, made[-1])
+    grey = arrays(made[-1])["Intensity"].astype(float)
+    expected, now = arrays(whole)["Intensity"].astype(float)[arrays(whole)["Embedding"] == 3], grey[labels == 3]
+    assert abs(now.mean() - expected.mean()) < 0.05 * expected.mean() and abs(now.std() - expected.std()) < 0.15 * expected.std()
+assert all((a == b).all() for a, b in zip(arrays(made[0]).values(), arrays(made[1]).values()))
+errors = []
+filter.AddObserver(vtkCommand.ErrorEvent, lambda *_: errors.append(1))
+filter.UpdateWholeExtent()  # as a whole it does not fit
+assert errors
+filter.SetMaximumMemoryGb(0.2)  # nor does what has to be known of it
+filter.UpdateInformation()
+assert len(errors) > 1
