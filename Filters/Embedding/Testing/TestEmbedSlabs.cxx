@@ -127,6 +127,7 @@ TEST(EmbedSlabs, DataStayWhereTheyAreAndAsTheyAre)
 // However thick slabs are, the same voxels come out; but for the last grey level where parts meet.
 TEST(EmbedSlabs, DoNotShowInTheResult)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const Data data(size);
   const auto slabs = Planned(data, 60);
   const Result whole = Made(data, *slabs, slabs->Grid().dimensions[2], 60), parts = Made(data, *slabs, 5, 60);
