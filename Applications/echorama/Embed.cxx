@@ -36,14 +36,14 @@ void CountLabels(vtkImageData* image, LabelCounts& voxels)
       ++voxels[label];
 }
 
-// The filter knows no files, but for the names of noise volumes.
+// To be called where \a error was caught: the filter knows no files, but for the names of noise volumes.
 [[noreturn]] void Fail(const Error& error, const EmbedOptions& options, const std::vector<LoadedVolume>& noise)
 {
   const std::string reason = error.what(), subject = "the form";
   const bool named = std::any_of(noise.begin(), noise.end(),
                                  [&reason](const LoadedVolume& each) { return reason.find(each.file) != std::string::npos; });
   if (error.GetKind() == Error::Kind::Cancelled || named || reason.find(options.file) != std::string::npos)
-    throw error;
+    throw;
   if (reason.rfind(subject, 0) == 0)
     throw Error(error.GetKind(), options.form + reason.substr(subject.size()));
   throw Error(error.GetKind(), options.file + ": " + reason);
@@ -136,8 +136,12 @@ void Embed(Session& session, const EmbedOptions& options, vtkUltrasoundEmbedder*
   const bool isLarge = embedder->IsLargerThanMemory();
   Session::TakeReportedError(); // who reads the volume tells it
   try {
-    if (isLarge)
-      return EmbedLarge(session, options, embedder);
+    if (isLarge) {
+      EmbedLarge(session, options, embedder);
+      for (const std::string& note : LinesOf(reader->GetNotes()))
+        session.Note(options.file + ": " + note);
+      return;
+    }
     const LoadedVolume volume = LoadVolume(session, options.file);
     embedder->SetInputData(0, volume.image);
     session.Watch(embedder, "plan", options.file, [&] { embedder->UpdateInformation(); });

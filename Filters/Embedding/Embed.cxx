@@ -90,34 +90,37 @@ Volume<unsigned char> Grown(VolumeView<const unsigned char> mask)
   return grown;
 }
 
-// Where background shows, and where nothing else does.
+// Where background shows.
 struct Masks {
   Masks(const EmbedParameters& parameters, VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing,
         VolumeView<const unsigned char> form, const Progress& progress)
-    : weights(region.Dimensions()), shown(region.Dimensions()), bare(region.Dimensions())
+    : weights(region.Dimensions()), shown(region.Dimensions())
   {
     FeatherWeights(parameters, region, form, spacing, weights.View(), progress);
     ParallelRanges(region.Size(), 1 << 16, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-      for (std::ptrdiff_t at = begin; at < end; ++at) {
-        const bool inside = form.Empty() || form[at];
-        shown.View()[at] = inside && weights.View()[at] < 1.0f;
-        bare.View()[at] = inside && !region[at];
-      }
+      for (std::ptrdiff_t at = begin; at < end; ++at)
+        shown.View()[at] = (form.Empty() || form[at]) && weights.View()[at] < 1.0f;
     });
   }
   Volume<float> weights;
-  Volume<unsigned char> shown, bare;
+  Volume<unsigned char> shown;
 };
 
 template <class T>
 EmbedLevels Spread(const EmbedParameters& parameters, const LocalStatistics& statistics, VolumeView<const T> intensity,
                    VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing, VolumeView<const unsigned char> shown,
-                   VolumeView<const unsigned char> bare, const Progress& progress)
+                   const Progress& progress)
 {
   const double roundedVariance = std::is_integral_v<T> ? 1.0 / 12.0 : 0.0; // that rounding adds to data and result alike
   EmbedLevels spread;
   const Blocks& blocks = spread.blocks = BlocksFor(parameters, region.Dimensions(), spacing);
-  std::vector<Volume<unsigned char>> some = BlocksWith(blocks, {region, shown, bare}, progress.Part(0.0, 0.2));
+  Volume<unsigned char> bare(region.Dimensions()); // where nothing but background shows
+  ParallelRanges(region.Size(), 1 << 16, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
+    for (std::ptrdiff_t at = begin; at < end; ++at)
+      bare.View()[at] = shown[at] && !region[at];
+  });
+  std::vector<Volume<unsigned char>> some =
+      BlocksWith(blocks, {region, shown, std::as_const(bare).View()}, progress.Part(0.0, 0.2));
   const Volume<unsigned char>&held = some[0], &showing = some[1];
   Volume<unsigned char>& border = some[2];
   // The surface of the blocks, and whatever block holds both: the walls of holes that are smaller than a block.
@@ -276,8 +279,8 @@ void Embed(const EmbedParameters& parameters, VolumeView<const unsigned char> re
   const Masks masks(parameters, region, spacing, form, progress.Part(0.0, 0.15));
   const LocalStatistics statistics =
       GrainStatistics(VolumeView<const T>(intensity), region, spacing, parameters.smoothMm, progress.Part(0.15, 0.25));
-  const EmbedLevels levels = Spread<T>(parameters, statistics, intensity, region, spacing, masks.shown.View(), masks.bare.View(),
-                                       progress.Part(0.25, 0.5));
+  const EmbedLevels levels =
+      Spread<T>(parameters, statistics, intensity, region, spacing, masks.shown.View(), progress.Part(0.25, 0.5));
   Render<T>(parameters, levels, {0, 0, 0}, masks, region, spacing, noise, form, intensity, labels, &statistics,
             progress.Part(0.5, 1.0));
 }
@@ -293,8 +296,7 @@ EmbedLevels LevelsAround(const EmbedParameters& parameters, VolumeView<const uns
   CheckSomeData(region);
   const Masks masks(parameters, region, spacing, form, progress.Part(0.0, 0.3));
   const LocalStatistics statistics = GrainStatistics(intensity, region, spacing, parameters.smoothMm, progress.Part(0.3, 0.6));
-  return Spread<T>(parameters, statistics, intensity, region, spacing, masks.shown.View(), masks.bare.View(),
-                   progress.Part(0.6, 1.0));
+  return Spread<T>(parameters, statistics, intensity, region, spacing, masks.shown.View(), progress.Part(0.6, 1.0));
 }
 
 template <class T>

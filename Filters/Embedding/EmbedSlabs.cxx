@@ -10,6 +10,7 @@
 #include "Core/Imaging/VoxelTypes.h"
 #include "EmbedGrid.h"
 #include "FanNoise.h"
+#include "Filters/Stitching/StitchSampler.h"
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -34,7 +35,9 @@ class SlabsOf : public EmbedSlabs {
 public:
   SlabsOf(const Settings& settings, const ImageGeometry& data) : EmbedSlabs(settings, data)
   {
-    CheckRanges(settings_.embed.featherMm < 0.0 ? WithoutFeather() : settings_.embed);
+    EmbedParameters checked = settings.embed; // whose feather may be automatic
+    checked.featherMm = std::max(checked.featherMm, 0.0);
+    CheckRanges(checked);
     data.Check("the volume");
     if (*std::min_element(data.dimensions.begin(), data.dimensions.end()) < 2)
       throw Error(Error::Kind::BadInput, "embedding by slabs: it takes a volume of several slices");
@@ -103,8 +106,6 @@ public:
 
   void Plan(const Progress& progress) override
   {
-    if (last_[0] < 0)
-      throw Error(Error::Kind::BadInput, "embedding: no voxel of the data is valid");
     form_ = EncloseRegion(std::as_const(isAnyReal_).View(), coarse_, settings_.enclosing, progress.Part(0.0, 0.2));
     isAnyReal_ = Volume<unsigned char>();
     std::array<int, 3> first{}, last{};
@@ -119,14 +120,14 @@ public:
       grid_.dimensions[axis] = factor_ * grid.geometry.dimensions[axis];
     }
     grid_.origin = data_.IndexToWorld() * Eigen::Vector3d(-offset_[0], -offset_[1], -offset_[2]);
-    for (slices_ = mostSlices; slices_ > leastSlices && SlabBytes(slices_) > settings_.bytes; slices_ = slices_ * 3 / 4) {
-    }
-    slices_ = std::max(slices_, leastSlices);
-    if (SlabBytes(slices_) > settings_.bytes)
-      throw Error(Error::Kind::TooLarge, "embedding by slabs needs " + Gigabytes(SlabBytes(slices_)) + " on a grid of " +
+    int slices = mostSlices;
+    while (slices > leastSlices && SlabBytes(slices) > settings_.bytes)
+      slices = std::max(leastSlices, slices * 3 / 4);
+    if (SlabBytes(slices) > settings_.bytes)
+      throw Error(Error::Kind::TooLarge, "embedding by slabs needs " + Gigabytes(SlabBytes(slices)) + " on a grid of " +
                                              SizeText(grid_.dimensions) + " voxels, and " + Gigabytes(settings_.bytes) +
                                              " are allowed");
-    slabs_ = (grid_.dimensions[2] + slices_ - 1) / slices_;
+    slabs_ = (grid_.dimensions[2] + slices - 1) / slices;
     MeasureGrain(progress.Part(0.2, 0.4));
     FindLevels(grid, progress.Part(0.4, 1.0));
   }
@@ -178,12 +179,6 @@ private:
     std::vector<unsigned char> isReal;
   };
 
-  EmbedParameters WithoutFeather() const
-  {
-    EmbedParameters p = settings_.embed;
-    p.featherMm = 0.0;
-    return p;
-  }
   std::size_t SliceSize() const
   {
     return static_cast<std::size_t>(data_.dimensions[0]) * static_cast<std::size_t>(data_.dimensions[1]);
@@ -209,7 +204,7 @@ private:
     grid.spacing *= factor_;
     for (std::size_t axis = 0; axis < 3; ++axis)
       grid.dimensions[axis] = (data_.dimensions[axis] + factor_ - 1) / factor_ * 5 / 4 + 1;
-    return EmbedMemory(WithoutFeather(), grid) + static_cast<double>(grid.VoxelCount()) * (2.0 * sizeof(T) + 4.0);
+    return EmbedMemory(settings_.embed, grid) + static_cast<double>(grid.VoxelCount()) * (2.0 * sizeof(T) + 4.0);
   }
 
   // What making a slab takes: slices of the data, the slab, and a brick.
@@ -223,7 +218,7 @@ private:
     const double held =
         static_cast<double>(SliceSize()) * std::min(data_.dimensions[2], slices + 2 * Halo(2) + BlockSize(2)) * (sizeof(T) + 1.0);
     return held + static_cast<double>(SliceSize()) * slicesAtATime_ * (sizeof(T) + 1.0) +
-           static_cast<double>(n[0]) * n[1] * slices * (sizeof(T) + 2.0) + EmbedMemory(WithoutFeather(), brick) +
+           static_cast<double>(n[0]) * n[1] * slices * (sizeof(T) + 2.0) + EmbedMemory(settings_.embed, brick) +
            static_cast<double>(brick.VoxelCount()) * (sizeof(T) + 6.0);
   }
 
@@ -255,16 +250,12 @@ private:
         std::copy_n(voxels.Row(j + at[1], k + at[2]) + at[0], size[0], grain_.View().Row(j, k));
         std::copy_n(real.Row(j + at[1], k + at[2]) + at[0], size[0], isGrainReal_.View().Row(j, k));
       }
-    grainPlace_ = data_;
-    grainPlace_.dimensions = size;
-    grainPlace_.origin = data_.IndexToWorld() * Eigen::Vector3d(at[0], at[1], first + at[2]);
+    grainPlace_ = Cropped(data_, {{at[0], at[1], first + at[2]}, size});
   }
 
   // Along parallel beams that go as those of the form do in the middle of the part.
   void MeasureGrain(const Progress& progress)
   {
-    BeamNoiseParameters& p = noise_.parameters;
-    p.depthCorrelationMm = std::min(p.depthCorrelationMm, 0.25 * (form_.geometry.depthMax - form_.geometry.depthMin));
     if (settings_.matchGrain) {
       const Eigen::Vector3d centre = grainPlace_.Centre();
       const auto beam = BeamPointAt(form_.geometry, form_.probeToWorld.inverse() * centre);
@@ -282,8 +273,7 @@ private:
       noise_ =
           NoiseBehind<T>({std::as_const(grain_).View(), std::as_const(isGrainReal_).View(), grainPlace_}, form_, progress, &box);
     }
-    p.seed = settings_.seed;
-    p = ResolvingCounts(p, form_.geometry, 3.0, std::max(16e6, static_cast<double>(grid_.VoxelCount())));
+    noise_.parameters = ForGrid(noise_.parameters, form_, grid_, settings_.seed);
     if (settings_.embed.featherMm < 0.0)
       settings_.embed.featherMm = FeatherDepth(noise_.grainMm, data_.spacing);
     grain_ = Volume<T>();
@@ -339,11 +329,9 @@ private:
       }
     });
     {
-      ImageGeometry its = grid_;
-      its.origin = grid_.IndexToWorld() * Eigen::Vector3d(begin[0], begin[1], begin[2]);
-      its.dimensions = size;
       Volume<float> noise(size);
-      FillFanWithNoise(noise_.parameters, form_, its, noise.View(), form.View(), progress.Part(0.0, 0.5));
+      FillFanWithNoise(noise_.parameters, form_, Cropped(grid_, {begin, size}), noise.View(), form.View(),
+                       progress.Part(0.0, 0.5));
       EmbedPart<T>(settings_.embed, levels_, begin, std::as_const(region).View(), data_.spacing, noise.View(),
                    std::as_const(form).View(), intensity.View(), labels.View(), progress.Part(0.5, 1.0));
     }
@@ -358,7 +346,7 @@ private:
     });
   }
 
-  int factor_ = 2, slices_ = 1;
+  int factor_ = 2;
   ImageGeometry coarse_;
   Volume<T> sample_;
   Volume<unsigned char> isSampleReal_, isAnyReal_; // of each cell: the sample, and whether any voxel is real

@@ -11,11 +11,10 @@ namespace echorama {
 /// Embeds a volume that is larger than the memory, slab by slab: first all its slices are looked at, then parts of the result can
 /// be made, each from the slices near it.
 ///
-/// The outline, and the levels that the background takes from the data, come from every so-many-th voxel along each axis, at most
-/// a third of smoothMm apart, so that they are those of the whole but for what speckle makes of the mean of fewer voxels. The
-/// grain is measured on the part of one slab that holds most data. All else (noise, feather, labels) is worked out for every
-/// voxel. The result does not depend on how it is cut, but for one part in a thousand of the noise's deviation near the borders
-/// of parts.
+/// The outline, and the levels that the background takes from the data, come from every so-many-th voxel along each axis (every
+/// second one at least, else at most a third of smoothMm apart): those of the whole but for what speckle makes of fewer voxels.
+/// The grain is measured on the part of one slab that holds most data. All else (noise, feather, labels) is worked out for every
+/// voxel. How the result is cut shows in few voxels of the background, which differ in the last grey level.
 class EmbedSlabs {
 public:
   struct Settings {

@@ -5,6 +5,7 @@
 #include "FanNoise.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/ScanConversion.h"
+#include "Filters/Stitching/StitchSampler.h"
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Geometry>
@@ -14,26 +15,13 @@ namespace echorama {
 
 namespace {
 
-struct Box {
-  std::array<int, 3> first{}, size{};
-  double Count() const { return static_cast<double>(size[0]) * size[1] * size[2]; }
-};
-
-constexpr int LeastPart = 4; // voxels along an edge
-
-ImageGeometry GridOf(const ImageGeometry& grid, const Box& part)
-{
-  ImageGeometry its = grid;
-  its.origin = grid.IndexToWorld() * Eigen::Vector3d(part.first[0], part.first[1], part.first[2]);
-  its.dimensions = part.size;
-  return its;
-}
+constexpr int leastPart = 4; // voxels along an edge
 
 // The samples that a part of the grid lies between; none where it is beside the fan.
-Box BeamsAround(const PlacedProbe& fan, const std::array<int, 3>& all, const ImageGeometry& part)
+GridBox BeamsAround(const PlacedProbe& fan, const std::array<int, 3>& all, const ImageGeometry& part)
 {
   const ProbeGeometry& g = fan.geometry;
-  Box box{{0, 0, 0}, all};
+  GridBox box{{0, 0, 0}, all};
   const Eigen::Affine3d toProbe = fan.probeToWorld.inverse() * part.IndexToWorld();
   Eigen::AlignedBox3d range;
   constexpr int steps = 8;
@@ -70,36 +58,44 @@ Box BeamsAround(const PlacedProbe& fan, const std::array<int, 3>& all, const Ima
 
 } // namespace
 
+BeamNoiseParameters ForGrid(BeamNoiseParameters parameters, const PlacedProbe& fan, const ImageGeometry& grid, std::uint64_t seed)
+{
+  parameters.seed = seed;
+  parameters.depthCorrelationMm = std::min(parameters.depthCorrelationMm, 0.25 * (fan.geometry.depthMax - fan.geometry.depthMin));
+  return ResolvingCounts(parameters, fan.geometry, 3.0, std::max(16e6, static_cast<double>(grid.VoxelCount())));
+}
+
 void FillFanWithNoise(const BeamNoiseParameters& parameters, const PlacedProbe& fan, const ImageGeometry& grid,
                       VolumeView<float> noise, VolumeView<unsigned char> inside, const Progress& progress, double most)
 {
   const std::array<int, 3> all = BeamNoiseSize(parameters, fan.geometry);
-  if (Box{{}, all}.Count() <= most) {
+  const auto count = [](const GridBox& box) { return static_cast<double>(box.VoxelCount()); };
+  if (count({{0, 0, 0}, all}) <= most) {
     const Volume<float> beams = MakeBeamNoise(parameters, fan.geometry, progress.Part(0.0, 0.5));
     ScanConvert<float>(beams.View(), fan.geometry, fan.probeToWorld, grid, noise, inside, progress.Part(0.5, 1.0));
     return;
   }
   std::fill(noise.begin(), noise.end(), 0.0f);
   std::fill(inside.begin(), inside.end(), static_cast<unsigned char>(0));
-  std::vector<Box> parts{{{0, 0, 0}, grid.dimensions}};
-  const double voxels = parts[0].Count();
+  std::vector<GridBox> parts{{{0, 0, 0}, grid.dimensions}};
+  const double voxels = count(parts[0]);
   double done = 0.0;
   while (!parts.empty()) {
     progress(done / voxels);
-    const Box part = parts.back();
+    const GridBox part = parts.back();
     parts.pop_back();
-    const ImageGeometry its = GridOf(grid, part);
-    const Box beams = BeamsAround(fan, all, its);
+    const ImageGeometry its = Cropped(grid, part);
+    const GridBox beams = BeamsAround(fan, all, its);
     const auto longest = static_cast<std::size_t>(std::max_element(part.size.begin(), part.size.end()) - part.size.begin());
-    if (beams.Count() > most && part.size[longest] > LeastPart) {
-      std::array<Box, 2> halves{part, part};
+    if (count(beams) > most && part.size[longest] > leastPart) {
+      std::array<GridBox, 2> halves{part, part};
       halves[0].size[longest] /= 2;
       halves[1].first[longest] += halves[0].size[longest];
       halves[1].size[longest] -= halves[0].size[longest];
       parts.insert(parts.end(), halves.begin(), halves.end());
       continue;
     }
-    if (beams.Count() > 0.0) {
+    if (!beams.Empty()) {
       const Volume<float> samples = MakeBeamNoise(parameters, fan.geometry, beams.first, beams.size);
       Volume<float> values(part.size);
       Volume<unsigned char> there(part.size);
@@ -113,7 +109,7 @@ void FillFanWithNoise(const BeamNoiseParameters& parameters, const PlacedProbe& 
         }
       });
     }
-    done += part.Count();
+    done += count(part);
   }
   progress(1.0);
 }

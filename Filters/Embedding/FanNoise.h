@@ -5,6 +5,11 @@
 
 namespace echorama {
 
+/// The parameters with this seed, for a fan on a grid: with as many samples as the lengths need, but no more than 16 million or
+/// there are voxels, and no longer along the depth than a fan allows.
+BeamNoiseParameters ForGrid(BeamNoiseParameters parameters, const PlacedProbe& fan, const ImageGeometry& grid,
+                            std::uint64_t seed);
+
 /// Noise along the beams of a fan (MakeBeamNoise), scan converted to any grid, a part of the fan for instance. Where the beams
 /// that the grid lies between have more samples together than \a most, the grid is filled in parts, each from its own: the noise
 /// is the same then, to what ScanConvert rounds. \param noise, inside views of the size of \a grid, overwritten: 0 in both

@@ -166,9 +166,7 @@ double vtkUltrasoundEmbedder::AllowedBytes() const
 //----------------------------------------------------------------------------
 double vtkUltrasoundEmbedder::BytesOn(const echorama::ImageGeometry& grid, vtkImageData* image) const
 {
-  echorama::EmbedParameters parameters = this->Values->embed;
-  parameters.featherMm = std::max(parameters.featherMm, 0.0);
-  double bytes = echorama::EmbedMemory(parameters, grid);
+  double bytes = echorama::EmbedMemory(this->Values->embed, grid);
   for (int i = 0; i < image->GetPointData()->GetNumberOfArrays(); ++i) {
     if (vtkDataArray* array = image->GetPointData()->GetArray(i)) {
       bytes += static_cast<double>(grid.VoxelCount()) * array->GetDataTypeSize() * array->GetNumberOfComponents();
@@ -211,10 +209,8 @@ bool vtkUltrasoundEmbedder::IsLarge()
     }
   }
   input->Get(vtkDataObject::SPACING(), grid.spacing.data());
-  echorama::EmbedParameters parameters = this->Values->embed;
-  parameters.featherMm = std::max(parameters.featherMm, 0.0);
   // The input, and the result at least: a voxel and its valid region each.
-  return echorama::EmbedMemory(parameters, grid) + 4.0 * static_cast<double>(grid.VoxelCount()) > this->AllowedBytes();
+  return echorama::EmbedMemory(this->Values->embed, grid) + 4.0 * static_cast<double>(grid.VoxelCount()) > this->AllowedBytes();
 }
 
 //----------------------------------------------------------------------------
@@ -452,10 +448,7 @@ void vtkUltrasoundEmbedder::MakeNoise(vtkInformationVector** inputs, const Plan&
 
   // 1. noise that is made, everywhere in the fan
   echorama::BeamNoiseParameters parameters;
-  parameters.depthCorrelationMm =
-      std::min(parameters.depthCorrelationMm, 0.25 * (plan.Form.geometry.depthMax - plan.Form.geometry.depthMin));
-  parameters = echorama::ResolvingCounts(parameters, plan.Form.geometry);
-  std::string note = "The noise is made";
+  std::string note = "The noise is made.";
   if (this->Values->matchGrain && volumes.empty()) {
     echorama::BackgroundNoise behind;
     vtkUltrasoundVolume::Dispatch(input.Intensity, [&](auto type) {
@@ -467,12 +460,8 @@ void vtkUltrasoundEmbedder::MakeNoise(vtkInformationVector** inputs, const Plan&
     this->SpeckleGrains = behind.grains;
     this->GrainMm = behind.grainMm;
     note = this->NoteOfNoise(behind);
-  } else {
-    note += ".";
   }
-  parameters.seed = this->Values->seed;
-  parameters =
-      echorama::ResolvingCounts(parameters, plan.Form.geometry, 3.0, std::max(16e6, static_cast<double>(grid.VoxelCount())));
+  parameters = echorama::ForGrid(parameters, plan.Form, grid, this->Values->seed);
   echorama::FillFanWithNoise(parameters, plan.Form, grid, noise, form, progress.Part(0.4, 0.8));
 
   // 2. real noise in its place, wherever there is any
@@ -517,8 +506,6 @@ void vtkUltrasoundEmbedder::Execute(vtkInformationVector** inputs, vtkImageData*
   const echorama::ImageGeometry& grid = plan.Grid.geometry;
   this->Notes = plan.Note + "\n";
 
-  echorama::EmbedParameters parameters = this->Values->embed;
-  parameters.featherMm = std::max(parameters.featherMm, 0.0);
   if (const double bytes = this->BytesOn(grid, image); bytes > this->AllowedBytes()) {
     throw Error(Error::Kind::TooLarge, "embedding on a grid of " + echorama::SizeText(grid.dimensions) + " voxels needs " +
                                            std::to_string(bytes / 1e9).substr(0, 5) +
@@ -553,7 +540,8 @@ void vtkUltrasoundEmbedder::Execute(vtkInformationVector** inputs, vtkImageData*
   Volume<float> noise(grid.dimensions);
   Volume<unsigned char> form(grid.dimensions);
   this->MakeNoise(inputs, plan, noise.View(), form.View(), progress.Part(0.1, 0.4));
-  if (this->Values->embed.featherMm < 0.0) {
+  echorama::EmbedParameters parameters = this->Values->embed;
+  if (parameters.featherMm < 0.0) {
     parameters.featherMm = echorama::FeatherDepth(this->GrainMm, vtkUltrasoundVolume::GeometryOf(image).spacing);
   }
   this->UsedFeatherMm = parameters.featherMm;

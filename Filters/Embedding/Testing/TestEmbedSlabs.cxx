@@ -41,10 +41,10 @@ struct Data {
         }
   }
 
-  void Show(int first, int count, const std::function<void(const void*, const Byte*)>& use) const
+  /// Slices from \a first on.
+  void Show(int first, const std::function<void(const void*, const Byte*)>& use) const
   {
     const std::ptrdiff_t slice = region.View().SliceStride();
-    static_cast<void>(count);
     use(intensity.View().Data() + slice * first, region.View().Data() + slice * first);
   }
 };
@@ -58,7 +58,7 @@ std::unique_ptr<EmbedSlabs> Planned(const Data& data, int atATime, EmbedSlabs::S
   const int slices = data.geometry.dimensions[2];
   for (int first = 0; first < slices; first += atATime) {
     const int count = std::min(atATime, slices - first);
-    data.Show(first, count, [&](const void* intensity, const Byte* region) { slabs->Look(first, count, intensity, region); });
+    data.Show(first, [&](const void* intensity, const Byte* region) { slabs->Look(first, count, intensity, region); });
   }
   slabs->Plan();
   return slabs;
@@ -77,7 +77,7 @@ Result Made(const Data& data, EmbedSlabs& slabs, int thick, int atATime)
     auto [from, to] = slabs.Missing(first, first + count);
     for (; from < to; from += std::min(atATime, to - from)) {
       const int some = std::min(atATime, to - from), at = from;
-      data.Show(at, some, [&](const void* intensity, const Byte* region) { slabs.Take(at, some, intensity, region); });
+      data.Show(at, [&](const void* intensity, const Byte* region) { slabs.Take(at, some, intensity, region); });
     }
     const auto [none, left] = slabs.Missing(first, first + count);
     EXPECT_GE(none, left);
@@ -196,14 +196,14 @@ TEST(EmbedSlabs, TheBackgroundIsThatOfTheWhole)
   }
 }
 
-TEST(EmbedSlabs, KeepsToTheMemoryAndSaysWhatItNeeds)
+TEST(EmbedSlabs, SaysHowMuchMemoryItNeeds)
 {
   ImageGeometry large;
   large.dimensions = {2000, 2000, 1000};
   large.spacing.setConstant(0.2);
   EmbedSlabs::Settings settings;
   settings.bytes = 3e9;
-  const auto slabs = EmbedSlabs::Make<Byte>(settings, large); // nothing of its size is made
+  const auto slabs = EmbedSlabs::Make<Byte>(settings, large);
   EXPECT_GE(slabs->SlicesAtATime(), 8);
   settings.bytes = 3e8;
   try {
@@ -225,7 +225,7 @@ TEST(EmbedSlabs, RefusesWhatIsMissingAndStopsOnRequest)
                         static_cast<std::size_t>(slabs->Grid().dimensions[1]) * 5);
   std::vector<Byte> region(out.size()), labels(out.size());
   EXPECT_THROW(slabs->Render(20, 5, out.data(), region.data(), labels.data()), Error);
-  data.Show(0, 60, [&](const void* intensity, const Byte* real) { slabs->Take(0, 60, intensity, real); });
+  data.Show(0, [&](const void* intensity, const Byte* real) { slabs->Take(0, 60, intensity, real); });
   const Progress stop([](double fraction) { return fraction < 0.3; });
   EXPECT_THROW(slabs->Render(20, 5, out.data(), region.data(), labels.data(), stop), Error);
   slabs->Render(20, 5, out.data(), region.data(), labels.data());

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
+#include "Core/Base/SymmetricMatrix.h"
 #include "Filters/Registration/PoseGraph.h"
+#include "Testing/Sanitized.h"
 #include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <limits>
 #include <numeric>
+#include <set>
 
 namespace echorama {
 namespace {
@@ -451,6 +454,53 @@ TEST(PoseGraph, ALongWayOfSureEdgesLeavesNoDirectionOpen)
   EXPECT_GT(std::sqrt(covariance.topLeftCorner<3, 3>().trace()), 3.0 * PoseGraphParameters().undeterminedMm);
   EXPECT_EQ(std::count(result.isDetermined.begin(), result.isDetermined.end(), true), count - 1);
   EXPECT_FALSE(result.isDetermined[count - 1]);
+}
+
+// A sweep in rows of 32, back and forth, each view with the six that it overlaps most.
+TEST(PoseGraph, FarVolumesOfManyRowsAreDetermined)
+{
+  ECHORAMA_SKIP_SANITIZED();
+  constexpr int count = 1000, row = 32;
+  std::vector<Pose> poses(count, Pose::Identity());
+  for (int v = 0; v < count; ++v)
+    poses[Index(v)].translation() =
+        Eigen::Vector3d(15.0 * (v / row % 2 == 0 ? v % row : row - 1 - v % row), 30.0 * (v / row), 0.0);
+  std::set<std::pair<int, int>> pairs;
+  for (int v = 0; v < count; ++v) {
+    std::vector<std::pair<double, int>> overlaps;
+    for (int other = 0; other < count; ++other) {
+      const Eigen::Vector3d apart = (poses[Index(other)].translation() - poses[Index(v)].translation()).cwiseAbs();
+      if (other != v && apart.maxCoeff() < 64.0)
+        overlaps.push_back({-(64.0 - apart[0]) * (64.0 - apart[1]), other});
+    }
+    std::sort(overlaps.begin(), overlaps.end());
+    for (std::size_t n = 0; n < std::min<std::size_t>(6, overlaps.size()); ++n)
+      pairs.insert({std::min(v, overlaps[n].second), std::max(v, overlaps[n].second)});
+  }
+  std::vector<PoseEdge> edges;
+  for (const auto& [from, to] : pairs) {
+    PoseEdge edge;
+    edge.from = from;
+    edge.to = to;
+    edge.toInFrom = poses[Index(from)].inverse() * poses[Index(to)];
+    edge.centre = 0.5 * edge.toInFrom.translation() + Eigen::Vector3d::Constant(32.0);
+    edge.information.setZero();
+    edge.information.diagonal() << Eigen::Vector3d::Constant(25.0), Eigen::Vector3d::Constant(25000.0);
+    edges.push_back(edge);
+  }
+  PoseGraphParameters p;
+  p.floorMm = 0.6; // 0.3 voxels of 2 mm
+  p.radiusMm = 32.0;
+  const PoseGraphResult result = SolvePoseGraph(poses, edges, 0, p);
+  Twist scale;
+  scale << 1.0, 1.0, 1.0, p.radiusMm, p.radiusMm, p.radiusMm;
+  int far = 0; // beside the first volume
+  for (int v = 1; v < count; ++v) {
+    const Information covariance = scale.asDiagonal() * result.information[Index(v)].inverse() * scale.asDiagonal();
+    far += std::sqrt(EigenOfSymmetric(covariance).values.maxCoeff()) > p.undeterminedMm;
+  }
+  EXPECT_NEAR(far, 281, 15);
+  EXPECT_EQ(std::count(result.isDetermined.begin(), result.isDetermined.end(), true), count);
 }
 
 TEST(PoseGraph, LimitsOfTheLoss)
