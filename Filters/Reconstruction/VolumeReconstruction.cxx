@@ -178,7 +178,7 @@ struct VolumeReconstruction<T>::Body {
                  Zeroed<Cell>& target);
   void LayOver(Cell& cell, Cell& fresh) const;
   bool Blend(const ReconstructionFrame<T>& a, const ReconstructionFrame<T>& b);
-  void Write(int axis, int lower, int upper);
+  void Write(int axis, int lower, int upper, const int* from, const int* to);
 };
 
 // What a frame brought to a voxel is laid over what was there.
@@ -371,13 +371,14 @@ bool VolumeReconstruction<T>::Body::SplatSlab(const std::vector<Plane<T>>& plane
   return any;
 }
 
+// Of the slab, what lies in the box of the frames, \a from and \a to: of all the other rows none was touched.
 template <class T>
-void VolumeReconstruction<T>::Body::Write(int axis, int lower, int upper)
+void VolumeReconstruction<T>::Body::Write(int axis, int lower, int upper, const int* from, const int* to)
 {
   const int nx = grid.dimensions[0];
   const bool mean = parameters.compounding == Compounding::Mean;
-  for (int k = axis == 2 ? lower : 0; k < (axis == 2 ? upper : grid.dimensions[2]); ++k)
-    for (int j = axis == 1 ? lower : 0; j < (axis == 1 ? upper : grid.dimensions[1]); ++j) {
+  for (int k = axis == 2 ? lower : from[2]; k < (axis == 2 ? upper : to[2]); ++k)
+    for (int j = axis == 1 ? lower : from[1]; j < (axis == 1 ? upper : to[1]); ++j) {
       const std::size_t row = static_cast<std::size_t>(RowOf(j, k));
       for (int i = touchedFrom[row]; i <= touchedTo[row]; ++i) {
         const std::size_t at = row * static_cast<std::size_t>(nx) + static_cast<std::size_t>(i);
@@ -432,7 +433,7 @@ bool VolumeReconstruction<T>::Body::Splat(const std::vector<Plane<T>>& planes)
     };
     const bool any = parameters.splat == SplatMethod::Nearest ? run(std::integral_constant<SplatMethod, SplatMethod::Nearest>())
                                                               : run(std::integral_constant<SplatMethod, SplatMethod::Linear>());
-    Write(axis, lower, upper);
+    Write(axis, lower, upper, from, to);
     reached[static_cast<std::size_t>(slab)] = any;
   });
   return std::find(reached.begin(), reached.end(), 1) != reached.end();
@@ -526,7 +527,7 @@ bool VolumeReconstruction<T>::Body::Blend(const ReconstructionFrame<T>& a, const
         done = std::max(done, end);
       }
     }
-    Write(axis, lower, lower + 1);
+    Write(axis, lower, lower + 1, from, to);
   });
   return std::find(reached.begin(), reached.end(), 1) != reached.end();
 }
