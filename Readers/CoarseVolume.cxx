@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Readers/CoarseVolume.h"
 #include "Core/Base/NumberText.h"
+#include "Core/Geometry/CoarseGrid.h"
 #include <cstring>
 #include <utility>
 #include <vector>
@@ -14,9 +15,7 @@ public:
     : VolumeSource(whole->Content().path, whole->Content().format), whole_(std::move(whole)), stride_(stride)
   {
     content_ = whole_->Content();
-    for (int& n : content_.geometry.dimensions)
-      n = (n + stride - 1) / stride;
-    content_.geometry.spacing *= stride;
+    content_.geometry = CoarseGrid(content_.geometry, stride);
     Note("one of " + NumberText(stride) + " voxels along each axis was read");
   }
 
@@ -52,6 +51,11 @@ private:
 
 std::unique_ptr<VolumeSource> CoarseVolume(std::unique_ptr<VolumeSource> whole, int stride)
 {
+  if (stride == 0)
+    for (stride = 1; whole->ReadsSlices() && CoarseGrid(whole->Content().geometry, stride).VoxelCount() > 128'000'000;)
+      ++stride;
+  if (stride == 1)
+    return whole;
   if (!whole->ReadsSlices())
     throw Error(Error::Kind::NotPossible,
                 whole->Content().path +

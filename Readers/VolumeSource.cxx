@@ -35,9 +35,9 @@ ParameterList Describe(VolumeReadParameters& p)
           "taken, else 1 mm, with a note. Other formats know theirs.")
           .Advanced(),
       Parameter(
-          "Stride", p.stride, {1, 1000}, "voxels",
+          "Stride", p.stride, {0, 1000}, "voxels",
           "Only one of so many voxels along each axis is read, for a first look at a large volume; those between are skipped. "
-          "For MetaImage, NRRD and NIfTI.")
+          "For MetaImage, NRRD and NIfTI. 0 takes the smallest that leaves at most 128 million voxels, and 1 for other formats.")
           .Advanced(),
   };
 }
@@ -70,8 +70,7 @@ std::unique_ptr<VolumeSource> OpenWhole(const std::string& path, const VolumeRea
 std::unique_ptr<VolumeSource> OpenVolume(const std::string& path, const VolumeReadParameters& parameters)
 {
   CheckRanges(parameters, path);
-  std::unique_ptr<VolumeSource> whole = OpenWhole(path, parameters);
-  return parameters.stride > 1 ? CoarseVolume(std::move(whole), parameters.stride) : std::move(whole);
+  return CoarseVolume(OpenWhole(path, parameters), parameters.stride);
 }
 
 } // namespace echorama

@@ -90,7 +90,8 @@ public:
 
   /**
    * Only one of so many voxels along each axis is read, for a first look at a large volume; those between are skipped. For
-   * MetaImage, NRRD and NIfTI. In [1, 1000] voxels; default 1.
+   * MetaImage, NRRD and NIfTI. 0 takes the smallest that leaves at most 128 million voxels, and 1 for other formats. In [0, 1000]
+   * voxels; default 1.
    */
   vtkUltrasoundIntegerMacro(Stride);
 

@@ -3,7 +3,7 @@
 #include "AlgorithmRun.h"
 #include "Controls.h"
 #include "Core/Base/FileReplacement.h"
-#include "Core/Geometry/PoseFile.h"
+#include "Filters/Calibration/ItkTransform.h"
 #include "Messages.h"
 #include "Readers/OutputFiles.h"
 #include <filesystem>

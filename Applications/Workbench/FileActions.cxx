@@ -25,6 +25,9 @@ namespace {
 
 constexpr const char* VolumeFilter = "*.mha *.mhd *.nrrd *.nhdr *.nii *.nii.gz *.vdb *.vti *.dcm *.vol *.png *.tif *.tiff *.jpg";
 
+// A volume that would take more of the free memory is shown coarsely: a copy to paint in and what is made of it need room, too.
+constexpr double WholeShare = 0.25;
+
 QString LastFolder()
 {
   return QSettings().value("files/folder").toString();
@@ -94,7 +97,7 @@ void FileActions::Open(const QStringList& paths)
     const Kind kind = KindOf(path);
     (kind == Kind::Volume ? volumes : kind == Kind::Project ? projects : poses).append(QFileInfo(path).absoluteFilePath());
   }
-  for (const char* topic : {"volumes", "project", "poses"})
+  for (const char* topic : {"volumes", "project", "poses", "coarse"})
     bench_->Forget(topic); // what could not be opened before
   if (projects.size() > 1)
     bench_->Note(tr("One project can be open at a time: %1 is opened. Open the others one by one.")
@@ -134,7 +137,7 @@ void FileActions::OpenVolumes(const QStringList& files, const std::function<void
         if (const int id = session->AddVolume(volume.image, volume.file.toUtf8().constData()); id > 0)
           last = id;
         else
-          volume = {volume.file, nullptr, QString::fromUtf8(messages.Error().c_str())};
+          volume = {volume.file, nullptr, QString::fromUtf8(messages.Error().c_str()), 1};
       }
     WarnOfUnread(*read);
     if (wasUntouched)
@@ -147,7 +150,7 @@ void FileActions::OpenVolumes(const QStringList& files, const std::function<void
       then();
   };
   bench_->Shared().Run(
-      this, label, [volumes, read](const Progress& progress) { *read = ReadVolumes(volumes, progress); },
+      this, label, [volumes, read](const Progress& progress) { *read = ReadVolumes(volumes, progress, WholeShare); },
       [this, add] { bench_->Shared().BetweenEdits(this, add); });
 }
 
@@ -163,6 +166,15 @@ void FileActions::WarnOfUnread(const std::vector<ReadVolume>& volumes)
     errors = errors.mid(0, most) + QStringList(tr("and %1 more that cannot be read").arg(errors.size() - most));
   if (!errors.isEmpty())
     bench_->Warn(errors.join('\n'), {{tr("Open other files..."), [this] { open_->trigger(); }}}, "volumes");
+  QStringList coarse;
+  for (const ReadVolume& volume : volumes)
+    if (volume.image && volume.stride > 1)
+      coarse.append(tr("%1 is large: one of %2 voxels along each axis was read. Poses that are found here hold for the whole; "
+                       "what is stitched here is as coarse, and echorama stitch --memory makes it of all voxels.")
+                        .arg(QFileInfo(volume.file).fileName())
+                        .arg(volume.stride));
+  if (!coarse.isEmpty())
+    bench_->Warn(coarse.mid(0, most).join('\n'), {}, "coarse");
 }
 
 void FileActions::OpenProject(const QString& path, const std::function<void()>& then)
@@ -230,7 +242,7 @@ void FileActions::ReadProject(const QString& path, const QString& saveAs, const 
   const QString label = tr("Opening %1").arg(QFileInfo(path).fileName());
   const auto read = std::make_shared<std::vector<ReadVolume>>();
   bench_->Shared().Run(
-      this, label, [there, read](const Progress& progress) { *read = ReadVolumes(there, progress); },
+      this, label, [there, read](const Progress& progress) { *read = ReadVolumes(there, progress, WholeShare); },
       [this, path, saveAs, then, read, before = edits_] {
         WarnOfUnread(*read);
         for (const ReadVolume& volume : *read)

@@ -3,6 +3,7 @@
 // kernel to kernel, so that they need no memory; transforms become our JSON, poses transforms of ITK.
 #include "Commands.h"
 #include "Core/Geometry/TransformFile.h"
+#include "Filters/Calibration/ItkTransform.h"
 #include "FrameList.h"
 #include "ParameterOptions.h"
 #include "Readers/FileKind.h"
@@ -132,7 +133,7 @@ void Convert(Session& session, const ConvertOptions& options)
     Misused("--frames: " + options.input + " is no tracked sequence");
   if (kind != FileKind::Volume &&
       (options.reading.parameters.spacingMm > 0.0 || options.reading.step > 0 || options.reading.beams ||
-       !options.reading.parameters.stackSpacingMm.isZero(0.0) || options.reading.parameters.stride > 1))
+       !options.reading.parameters.stackSpacingMm.isZero(0.0) || options.reading.parameters.stride != 1))
     Misused("--time, --beams, --spacing, --stack-spacing and --stride: " + options.input + " is no volume");
   switch (kind) {
   case FileKind::Volume:

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Geometry/ImageGeometry.h"
 #include "Core/Base/Error.h"
-#include <limits>
+#include "Core/Geometry/CoarseGrid.h"
+#include <cmath>
 
 namespace echorama {
 
@@ -13,26 +14,18 @@ std::size_t ImageGeometry::VoxelCount() const
 
 Eigen::Affine3d ImageGeometry::IndexToWorld() const
 {
-  Eigen::Affine3d map = Eigen::Affine3d::Identity();
-  map.linear() = direction * spacing.asDiagonal();
-  map.translation() = origin;
-  return map;
+  return Eigen::Translation3d(origin) * Eigen::Affine3d(direction * spacing.asDiagonal());
 }
 
 Eigen::Affine3d ImageGeometry::WorldToIndex() const
 {
-  Eigen::Affine3d map = Eigen::Affine3d::Identity();
-  map.linear() = spacing.cwiseInverse().asDiagonal() * direction.inverse();
-  map.translation() = -(map.linear() * origin);
-  return map;
+  const Eigen::Matrix3d linear = spacing.cwiseInverse().asDiagonal() * direction.inverse();
+  return Eigen::Translation3d(-(linear * origin)) * Eigen::Affine3d(linear);
 }
 
 ImageGeometry ImageGeometry::Moved(const Pose& pose) const
 {
-  ImageGeometry moved = *this;
-  moved.origin = pose * origin;
-  moved.direction = pose.linear() * direction;
-  return moved;
+  return {dimensions, pose * origin, spacing, pose.linear() * direction};
 }
 
 Eigen::Vector3d ImageGeometry::Centre() const
@@ -49,8 +42,7 @@ void ImageGeometry::Check(const std::string& name) const
       fail("dimension " + std::to_string(axis) + " is " + std::to_string(dimensions[axis]) + "; it must be at least 1");
     product *= dimensions[axis];
   }
-  constexpr std::ptrdiff_t most = std::numeric_limits<std::ptrdiff_t>::max() / 16; // 16 bytes a voxel are enough for all we do
-  if (product > static_cast<double>(most))
+  if (product > 0x1p59) // 16 bytes a voxel are enough for all we do
     fail("the product of the dimensions overflows");
   if (!origin.allFinite() || !spacing.allFinite() || !direction.allFinite())
     fail("origin, spacing or direction holds a number that is not finite");
@@ -75,6 +67,22 @@ bool ImageGeometry::AgreesWith(const ImageGeometry& other, double tolerance) con
   }
   // A single voxel has no corners that tell its spacing.
   return (spacing - other.spacing).cwiseAbs().maxCoeff() <= tolerance * spacing.minCoeff();
+}
+
+ImageGeometry CoarseGrid(ImageGeometry whole, int stride)
+{
+  for (int& n : whole.dimensions)
+    n = (n - 1) / stride + 1;
+  whole.spacing *= stride;
+  return whole;
+}
+
+bool AreGridsOfOneVolume(const ImageGeometry& a, const ImageGeometry& b)
+{
+  if (a.spacing[0] > b.spacing[0])
+    return AreGridsOfOneVolume(b, a);
+  const double stride = std::round(b.spacing[0] / a.spacing[0]);
+  return stride <= 1000.0 && CoarseGrid(a, static_cast<int>(stride)).AgreesWith(b);
 }
 
 } // namespace echorama

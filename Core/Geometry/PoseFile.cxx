@@ -2,8 +2,8 @@
 // JSON prints the shortest digits that give a double back, so poses survive any number of rounds unchanged. All checks
 // are made on reading, with the place in the file in the message: a pose file is written by people and scripts too.
 #include "Core/Geometry/PoseFile.h"
-#include "Core/Base/NumberText.h"
 #include "Core/Base/TextFile.h"
+#include "Core/Geometry/CoarseGrid.h"
 #include "Core/Geometry/PoseJson.h"
 #include <filesystem>
 #include <set>
@@ -101,20 +101,6 @@ void WritePoses(const std::string& path, const std::vector<VolumePose>& poses)
   WriteTextFile(path, text + '\n');
 }
 
-void WriteItkTransform(const std::string& path, const Pose& volumeToWorld)
-{
-  if (!IsRotation(volumeToWorld.linear()) || !volumeToWorld.translation().allFinite())
-    throw Error(Error::Kind::InvalidParameter, path + ": the pose is not rigid");
-  const Pose inverse = volumeToWorld.inverse(Eigen::Isometry);
-  std::string text = "#Insight Transform File V1.0\n#Transform 0\nTransform: AffineTransform_double_3_3\nParameters:";
-  for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 3; ++column)
-      text += " " + NumberText(inverse(row, column));
-  for (int row = 0; row < 3; ++row)
-    text += " " + NumberText(inverse(row, 3));
-  WriteTextFile(path, text + "\nFixedParameters: 0 0 0\n");
-}
-
 const VolumePose& PoseFor(const std::vector<VolumePose>& poses, const std::string& file, const ImageGeometry& geometry)
 {
   const VolumePose* found = nullptr;
@@ -133,7 +119,7 @@ const VolumePose& PoseFor(const std::vector<VolumePose>& poses, const std::strin
   }
   if (!found)
     throw Error(Error::Kind::BadInput, file + ": the poses do not name this volume");
-  if (found->geometry && !found->geometry->AgreesWith(geometry))
+  if (found->geometry && !AreGridsOfOneVolume(*found->geometry, geometry))
     throw Error(Error::Kind::BadInput, file + ": its geometry is not the one that the poses were found for "
                                               "(has it been moved or resampled since?)");
   return *found;

@@ -30,12 +30,8 @@ void WritePoses(const std::string& path, const std::vector<VolumePose>& poses);
 
 /// The pose of the volume \a file with \a geometry: matched by resolved path, else, when no path matches, by file name
 /// if that is unique.
-/// \throws Error(BadInput) when there is none, or when its recorded geometry differs (so that nothing is moved twice).
+/// \throws Error(BadInput) when there is none, or when its recorded geometry is not of the same volume (so that nothing is moved
+/// twice); one at another stride is.
 const VolumePose& PoseFor(const std::vector<VolumePose>& poses, const std::string& file, const ImageGeometry& geometry);
-
-/// Writes a pose as a transform of ITK (.tfm) for other programs. ITK maps points of the result to points of what is moved, so
-/// the file holds the inverse: a volume under it in 3D Slicer lies where \a volumeToWorld puts it.
-/// \throws Error(InvalidParameter) for a pose that is not rigid, Error(FileSystem).
-void WriteItkTransform(const std::string& path, const Pose& volumeToWorld);
 
 } // namespace echorama

@@ -19,6 +19,22 @@ using echorama::Error;
 
 vtkStandardNewMacro(vtkUltrasoundDisplacement);
 
+namespace {
+// To result what is asked of the field of an image; false, with a warning, when it has none.
+template <class Ask>
+bool Put(vtkImageData* displacement, double result[3], const Ask& ask)
+{
+  try {
+    const Eigen::Vector3d found = ask(vtkUltrasoundDisplacement::FieldOf(displacement, "the displacement"));
+    std::copy_n(found.data(), 3, result);
+    return true;
+  } catch (const Error& error) {
+    vtkGenericWarningMacro(<< error.what());
+    return false;
+  }
+}
+} // namespace
+
 //----------------------------------------------------------------------------
 echorama::DisplacementField vtkUltrasoundDisplacement::FieldOf(vtkImageData* displacement, const std::string& name)
 {
@@ -91,25 +107,11 @@ void vtkUltrasoundDisplacement::ImageOf(const echorama::DisplacementField& field
 //----------------------------------------------------------------------------
 bool vtkUltrasoundDisplacement::Evaluate(vtkImageData* displacement, const double point[3], double result[3])
 {
-  try {
-    const Eigen::Vector3d u = FieldOf(displacement, "the displacement").At(Eigen::Vector3d(point));
-    std::copy_n(u.data(), 3, result);
-    return true;
-  } catch (const Error& error) {
-    vtkGenericWarningMacro(<< error.what());
-    return false;
-  }
+  return Put(displacement, result, [point](const auto& field) { return field.At(Eigen::Vector3d(point)); });
 }
 
 //----------------------------------------------------------------------------
 bool vtkUltrasoundDisplacement::Invert(vtkImageData* displacement, const double read[3], double belongs[3])
 {
-  try {
-    const Eigen::Vector3d x = FieldOf(displacement, "the displacement").Inverse(Eigen::Vector3d(read));
-    std::copy_n(x.data(), 3, belongs);
-    return true;
-  } catch (const Error& error) {
-    vtkGenericWarningMacro(<< error.what());
-    return false;
-  }
+  return Put(displacement, belongs, [read](const auto& field) { return field.Inverse(Eigen::Vector3d(read)); });
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
+#include "Core/Geometry/CoarseGrid.h"
 #include "Core/Geometry/PoseFile.h"
 #include <csignal>
 #include <filesystem>
@@ -157,6 +158,29 @@ TEST_F(PoseFile, FindsByPathThenByName)
   }
 }
 
+TEST_F(PoseFile, APoseFoundAtAStrideIsThatOfTheWholeVolume)
+{
+  ImageGeometry whole = SomeGeometry(1);
+  whole.dimensions = {10, 12, 13}; // one of three: 0, 3, 6, 9
+  const ImageGeometry coarse = CoarseGrid(whole, 3);
+  EXPECT_EQ(coarse.dimensions, (std::array<int, 3>{4, 4, 5}));
+  EXPECT_TRUE(
+      (coarse.IndexToWorld() * Eigen::Vector3d(1, 2, 3)).isApprox(whole.IndexToWorld() * Eigen::Vector3d(3, 6, 9), 1e-14));
+  EXPECT_TRUE(AreGridsOfOneVolume(whole, coarse) && AreGridsOfOneVolume(coarse, whole) && AreGridsOfOneVolume(whole, whole));
+  std::vector<VolumePose> poses{{Path("a.mha"), coarse}};
+  EXPECT_EQ(&PoseFor(poses, Path("a.mha"), whole), &poses[0]);
+  ImageGeometry averaged = coarse; // blocks of voxels: their middle lies elsewhere
+  averaged.origin = whole.IndexToWorld() * Eigen::Vector3d(1, 1, 1);
+  ImageGeometry longer = coarse, between = coarse;
+  longer.dimensions[2] = 6;
+  between.spacing = 2.5 * whole.spacing;
+  for (const ImageGeometry& other : {averaged, longer, between}) {
+    EXPECT_FALSE(AreGridsOfOneVolume(whole, other));
+    poses[0].geometry = other;
+    EXPECT_THROW(PoseFor(poses, Path("a.mha"), whole), Error);
+  }
+}
+
 TEST_F(PoseFile, RefusesWhatIsNotAPoseFile)
 {
   EXPECT_THROW(ReadPoses(Path("missing.json")), Error);
@@ -190,34 +214,6 @@ TEST_F(PoseFile, RefusesWhatIsNotAPoseFile)
   ExpectRefused(withGeometry(R"({"origin":[0,0],"spacing":[1,1,1],"dimensions":[2,2,2],)" + direction + "}"), "origin");
   ExpectRefused(withGeometry(R"({"origin":[0,0,0],"spacing":[1,1,1],"dimensions":[2,2.5,2],)" + direction + "}"), "dimensions");
   ExpectRefused(withGeometry(R"({"origin":[0,0,0],"spacing":[1,1,1],"dimensions":[2,2,2]})"), "direction");
-}
-
-TEST_F(PoseFile, ItkGetsTheInverse)
-{
-  const Pose pose = MotionAbout({1.0, 2.0, 3.0}, {0.1, -0.2, 0.3}, {4.0, 5.0, 6.0});
-  WriteItkTransform(Path("a.tfm"), pose);
-  std::istringstream lines(Text(Path("a.tfm")));
-  std::string line, word;
-  for (const std::string wanted : {"#Insight Transform File V1.0", "#Transform 0", "Transform: AffineTransform_double_3_3"}) {
-    std::getline(lines, line);
-    EXPECT_EQ(line, wanted);
-  }
-  lines >> word;
-  EXPECT_EQ(word, "Parameters:");
-  Pose back = Pose::Identity();
-  for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 3; ++column)
-      lines >> back.matrix()(row, column);
-  for (int row = 0; row < 3; ++row)
-    lines >> back.matrix()(row, 3);
-  EXPECT_TRUE((back * pose).isApprox(Pose::Identity(), 1e-14));
-  lines >> word;
-  EXPECT_EQ(word, "FixedParameters:"); // the centre of rotation
-  Pose sheared = pose;
-  sheared.matrix()(0, 1) += 0.1;
-  EXPECT_THROW(WriteItkTransform(Path("b.tfm"), sheared), Error);
-  EXPECT_THROW(WriteItkTransform(Path("missing/b.tfm"), pose), Error);
-  EXPECT_FALSE(fs::exists(Path("b.tfm")));
 }
 
 TEST_F(PoseFile, AFailedWriteLeavesWhatWasThere)

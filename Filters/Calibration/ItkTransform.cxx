@@ -2,6 +2,8 @@
 // elastix' transforms are those of ITK under other names, so both formats come down to a type, its parameters and its fixed
 // parameters. The type is looked at as soon as it is read: the numbers of a B-spline may fill a line of many megabytes.
 #include "Filters/Calibration/ItkTransform.h"
+#include "Core/Base/NumberText.h"
+#include "Core/Base/TextFile.h"
 #include "Readers/HeaderLines.h"
 #include <filesystem>
 #include <map>
@@ -315,6 +317,20 @@ private:
 Pose ReadItkTransform(const std::string& path)
 {
   return ItkTransformReader(path, 1).Read().inverse(Eigen::Isometry);
+}
+
+void WriteItkTransform(const std::string& path, const Pose& volumeToWorld)
+{
+  if (!IsRotation(volumeToWorld.linear()) || !volumeToWorld.translation().allFinite())
+    throw Error(Error::Kind::InvalidParameter, path + ": the pose is not rigid");
+  const Pose inverse = volumeToWorld.inverse(Eigen::Isometry);
+  std::string text = std::string(ItkMagic) + "\n#Transform 0\nTransform: AffineTransform_double_3_3\nParameters:";
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 3; ++column)
+      text += " " + NumberText(inverse(row, column));
+  for (int row = 0; row < 3; ++row)
+    text += " " + NumberText(inverse(row, 3));
+  WriteTextFile(path, text + "\nFixedParameters: 0 0 0\n");
 }
 
 } // namespace echorama

@@ -21,4 +21,9 @@ namespace echorama {
 /// mirror, numbers that are missing, too many, not finite or beyond 1e7 mm, images that were taken without their direction.
 Pose ReadItkTransform(const std::string& path);
 
+/// Writes a pose as a transform of ITK (.tfm) for other programs. ITK maps points of the result to points of what is moved, so
+/// the file holds the inverse: a volume under it in 3D Slicer lies where \a volumeToWorld puts it.
+/// \throws Error(InvalidParameter) for a pose that is not rigid, Error(FileSystem).
+void WriteItkTransform(const std::string& path, const Pose& volumeToWorld);
+
 } // namespace echorama

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "Core/Base/JoinedText.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
@@ -319,6 +320,26 @@ TEST_F(VolumeFile, SlicesAreThoseOfTheWhole)
   VolumeReadParameters coarsely;
   coarsely.stride = 2;
   ExpectRefused([&] { OpenVolume(Path("text.nrrd"), coarsely); }, Error::Kind::NotPossible, Path("text.nrrd"), "Stride");
+  coarsely.stride = 0;
+  EXPECT_EQ(OpenVolume(Path("text.nrrd"), coarsely)->Content().geometry.dimensions, (std::array<int, 3>{1, 1, 2}));
+}
+
+TEST_F(VolumeFile, StrideZeroLeavesAVolumeForAFirstLook)
+{
+  VolumeReadParameters coarsely;
+  coarsely.stride = 0;
+  const auto dimensionsOf = [&](int x) {
+    const std::string size = std::to_string(x) + " 400 400";
+    Put("large.mhd", "NDims = 3\nDimSize = " + size + "\nElementType = MET_UCHAR\nElementDataFile = large.raw\n");
+    Put("large.raw", "");
+    std::filesystem::resize_file(Path("large.raw"), static_cast<std::uintmax_t>(x) * 160000);
+    const auto source = OpenVolume(Path("large.mhd"), coarsely);
+    EXPECT_EQ(Joined(source->Content().notes, " ").find("one of") == std::string::npos, x == 800);
+    return source->Content().geometry.dimensions;
+  };
+  EXPECT_EQ(dimensionsOf(800), (std::array<int, 3>{800, 400, 400})); // 128 million: as many as may be
+  EXPECT_EQ(dimensionsOf(801), (std::array<int, 3>{401, 200, 200}));
+  EXPECT_EQ(dimensionsOf(20000), (std::array<int, 3>{6667, 134, 134})); // a stride of 2 would leave 400 million
 }
 
 TEST_F(VolumeFile, AFullDiskLeavesWhatWasThere)

@@ -3,6 +3,7 @@
 // alone counts only when nothing else could be meant, and geometries are compared before anything is taken over.
 #include "Widgets/Session/ProjectVolumes.h"
 #include "Core/Base/Error.h"
+#include "Core/Geometry/CoarseGrid.h"
 #include "Widgets/Session/ProjectFile.h"
 #include <algorithm>
 #include <filesystem>
@@ -155,7 +156,7 @@ void FindVolumes(const std::string& path, std::vector<SessionVolume>& volumes, c
 
 void TakeGeometry(SessionVolume& volume, const ImageGeometry& found)
 {
-  if (volume.geometry.VoxelCount() > 0 && !volume.geometry.AgreesWith(found))
+  if (volume.geometry.VoxelCount() > 0 && !AreGridsOfOneVolume(volume.geometry, found))
     throw Error(Error::Kind::BadInput, volume.file + ": its geometry is not the one that the project was saved with "
                                                      "(has it been moved or resampled since?)");
   volume.geometry = found;

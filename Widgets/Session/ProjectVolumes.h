@@ -40,7 +40,8 @@ std::string LeaveOutFileless(const std::string& path, std::vector<SessionVolume>
 /// \throws Error(FileSystem) that names all that are nowhere, Error(BadInput) when two volumes are one file.
 void FindVolumes(const std::string& path, std::vector<SessionVolume>& volumes, const std::vector<std::string>& folders);
 
-/// Takes over the geometry that its file has. \throws Error(BadInput) when the project was saved with another.
+/// Takes over the geometry that its file has. \throws Error(BadInput) when the project was saved with that of another volume
+/// (another stride is none).
 void TakeGeometry(SessionVolume& volume, const ImageGeometry& found);
 
 } // namespace echorama

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
+#include "Core/Geometry/CoarseGrid.h"
 #include "SomeProject.h"
 #include "Widgets/Session/ProjectVolumes.h"
 
@@ -95,6 +96,9 @@ TEST_F(ProjectFolder, NothingIsMovedTwice)
   ImageGeometry other = volume.geometry;
   other.origin.x() += 1.0;
   EXPECT_THROW(TakeGeometry(volume, other), Error);
+  const ImageGeometry coarse = CoarseGrid(volume.geometry, 2); // it was read whole, and now is too large for that
+  TakeGeometry(volume, coarse);
+  EXPECT_EQ(volume.geometry.dimensions, coarse.dimensions);
   volume.geometry.dimensions = {0, 0, 0}; // the project does not say
   TakeGeometry(volume, other);
   EXPECT_EQ(volume.geometry.origin, other.origin);

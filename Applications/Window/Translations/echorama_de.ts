@@ -855,6 +855,10 @@
         <translation>Andere Dateien öffnen...</translation>
     </message>
     <message>
+        <source>%1 is large: one of %2 voxels along each axis was read. Poses that are found here hold for the whole; what is stitched here is as coarse, and echorama stitch --memory makes it of all voxels.</source>
+        <translation>%1 ist groß: Entlang jeder Achse wurde nur eines von %2 Voxeln gelesen. Lagen, die hier gefunden werden, gelten für das Ganze; was hier zusammengefügt wird, ist ebenso grob, und echorama stitch --memory macht es aus allen Voxeln.</translation>
+    </message>
+    <message>
         <source>Save what you did before %1 is opened?</source>
         <translation>Ihre Arbeit speichern, bevor %1 geöffnet wird?</translation>
     </message>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Where keys go after real clicks; and opening, leaving and coming back to work. No test here gives the focus to anything by
 // itself.
+#include "Core/Base/Memory.h"
 #include "FileActions.h"
 #include "Job.h"
 #include "JobBar.h"
@@ -21,6 +22,7 @@
 #include <QThread>
 #include <QtTest>
 #include <QVTKOpenGLNativeWidget.h>
+#include <vtkImageData.h>
 
 using namespace echorama;
 
@@ -36,6 +38,7 @@ private slots:
   void spacePressesTheButtonOfTheFocus();
   void returnAnswers();
   void everyFileThatCannotBeReadIsNamed();
+  void aVolumeTooLargeForTheMemoryIsShownCoarsely();
   void volumesWaitForTheEndOfADrag();
   void posesComeAfterTheirVolumes();
   void volumesComeAfterTheirProject();
@@ -189,6 +192,34 @@ void TestFiles::everyFileThatCannotBeReadIsNamed()
   for (int i = 0; i < 8; i++)
     QVERIFY(window.HasMessage(QString("missing%1.mha").arg(i)));
   window.Screenshot("eight-missing");
+}
+
+void TestFiles::aVolumeTooLargeForTheMemoryIsShownCoarsely()
+{
+  // A third of the free memory with its valid region, but hardly anything on the disk.
+  const auto slices = static_cast<qint64>(FreeMemory() / 6e6) + 150;
+  QFile header(Folder().filePath("large.mhd")), voxels(Folder().filePath("large.raw"));
+  QVERIFY(header.open(QIODevice::WriteOnly) && voxels.open(QIODevice::WriteOnly));
+  header.write(QString("NDims = 3\nDimSize = 1000 1000 %1\nElementSpacing = 0.2 0.2 0.2\nElementType = MET_UCHAR\n"
+                       "ElementDataFile = large.raw\n")
+                   .arg(slices)
+                   .toUtf8());
+  voxels.write(QByteArray(1000 * 1000, 100));
+  QVERIFY(voxels.resize(1000000 * slices));
+  header.close();
+  voxels.close();
+  const QString project = Folder().filePath("large.json");
+  for (const QString& file : {header.fileName(), project}) {
+    WindowUnderTest window;
+    QVERIFY(window.Open({file}));
+    QVERIFY2(window.HasMessage("large.mhd is large: one of"), qPrintable(window.Messages().join('\n')));
+    vtkImageData* image = window.Session()->GetImage(1);
+    const double stride = image->GetSpacing()[0] / 0.2;
+    QVERIFY(stride > 1.5 && image->GetNumberOfPoints() <= 128000000);
+    QCOMPARE(image->GetDimensions()[2], static_cast<int>((slices - 1) / std::lround(stride)) + 1);
+    QVERIFY(window.Session()->SaveProject(project.toUtf8().constData()));
+    window.Screenshot("large");
+  }
 }
 
 void TestFiles::volumesWaitForTheEndOfADrag()

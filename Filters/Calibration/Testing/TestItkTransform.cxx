@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The same motions by closed forms; that ITK and elastix understand the files as we do is tried in Testing/interchange.py.
-#include "Core/Geometry/PoseFile.h"
+#include "Core/Base/TextFile.h"
 #include "Filters/Calibration/ItkTransform.h"
 #include "Testing/TemporaryFolder.h"
 #include <cmath>
+#include <filesystem>
+#include <sstream>
 
 using namespace echorama;
 using namespace echorama::testing;
@@ -63,6 +65,34 @@ TEST_F(ItkTransformFile, WhatWeWriteComesBack)
   const Pose pose = MotionAbout({1.0, 2.0, 3.0}, {0.1, -2.2, 0.3}, {4.0, 50.0, 6.0});
   WriteItkTransform(Path("b.tfm"), pose);
   ExpectSame(ReadItkTransform(Path("b.tfm")), pose);
+}
+
+TEST_F(ItkTransformFile, ItkGetsTheInverse)
+{
+  const Pose pose = MotionAbout({1.0, 2.0, 3.0}, {0.1, -0.2, 0.3}, {4.0, 5.0, 6.0});
+  WriteItkTransform(Path("a.tfm"), pose);
+  std::istringstream lines(ReadTextFile(Path("a.tfm")));
+  std::string line, word;
+  for (const std::string wanted : {"#Insight Transform File V1.0", "#Transform 0", "Transform: AffineTransform_double_3_3"}) {
+    std::getline(lines, line);
+    EXPECT_EQ(line, wanted);
+  }
+  lines >> word;
+  EXPECT_EQ(word, "Parameters:");
+  Pose back = Pose::Identity();
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 3; ++column)
+      lines >> back.matrix()(row, column);
+  for (int row = 0; row < 3; ++row)
+    lines >> back.matrix()(row, 3);
+  EXPECT_TRUE((back * pose).isApprox(Pose::Identity(), 1e-14));
+  lines >> word;
+  EXPECT_EQ(word, "FixedParameters:"); // the centre of rotation
+  Pose sheared = pose;
+  sheared.matrix()(0, 1) += 0.1;
+  EXPECT_THROW(WriteItkTransform(Path("b.tfm"), sheared), Error);
+  EXPECT_THROW(WriteItkTransform(Path("missing/b.tfm"), pose), Error);
+  EXPECT_FALSE(std::filesystem::exists(Path("b.tfm")));
 }
 
 TEST_F(ItkTransformFile, EveryRigidTypeOfItk)
