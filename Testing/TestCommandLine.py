@@ -264,6 +264,18 @@ class MainJob(unittest.TestCase):
         self.assertIn("poses.json", again.stderr)
         self.assertEqual((folder / "poses.json").read_bytes(), before)
 
+    def test_poses_found_at_a_stride_are_those_of_the_whole_volumes(self):
+        poses = work / "coarse.json"
+        run("align", *volumes()[:2], "-o", poses, "--stride", 2, "--start", "tracked")
+        recorded = json.loads(poses.read_text())["volumes"][0]["geometry"]["spacing"]
+        self.assertEqual(recorded, [2 * length for length in run_json("info", volumes()[0])["files"][0]["spacing"]])
+        self.assertLess(run_json("score", poses, "--truth", phantom / "truth.json")["score_mm"], 2.5)  # half a coarse voxel
+        whole = run_json("stitch", *volumes()[:2], "--poses", poses, "-o", work / "whole.mha")
+        self.assertEqual(whole["spacing"], run_json("info", volumes()[0])["files"][0]["spacing"])
+        refused = run("align", *volumes()[:2], "-o", work / "no.json", "--stride", 2, "--apply", work / "no")
+        self.assertEqual(refused.returncode, 2)
+        self.assertIn("--stride", refused.stderr)
+
     def test_align_says_when_it_cannot(self):
         """Noise beside a phantom: exit status 3 and a reason."""
         write_mha(work / "random.mha", numpy.random.default_rng(1).integers(1, 255, (40, 40, 40), "u1"), spacing=(2.5, 2.5, 2.5))

@@ -24,6 +24,7 @@ constexpr const char* DefaultOutput = "poses.json";
 
 struct AlignOptions {
   std::vector<std::string> files;
+  VolumeReading reading;
   std::string output, poses, apply;
   int fixed = 1;
   std::vector<int> held; // from 1
@@ -158,7 +159,7 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
   }
   FileReplacement files; // all that is written takes its place together
 
-  std::vector<LoadedVolume> volumes = LoadVolumes(session, options.files);
+  std::vector<LoadedVolume> volumes = LoadVolumes(session, options.files, options.reading);
   ApplyPoses(session, volumes, options.poses);
   if (!options.tracker.log.empty())
     PlaceVolumes(session, options, volumes);
@@ -281,6 +282,7 @@ void EchoramaCommand(CLI::App* options, Action& action)
   options->get_option("--tracker-only")->needs("--tracker")->excludes(landmarks);
   options->get_option("--transforms-only")->excludes(landmarks);
   options->add_option("--apply", values->apply, "Folder for the volumes with their new geometry")->type_name("FOLDER");
+  AddParameter(options, Describe(values->reading.parameters), "Stride", "--stride")->excludes("--apply"); // of all voxels
   CLI::Option* deformable =
       options
           ->add_flag("--deformable", values->deformable,
