@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <set>
 #include <unistd.h>
 
 namespace fs = std::filesystem;
@@ -84,14 +85,16 @@ std::vector<std::string> FilesOfVolume(const std::string& path)
   return files;
 }
 
-bool IsCompanion(const std::string& file, const std::vector<std::string>& files)
+std::vector<bool> AreCompanions(const std::vector<std::string>& files)
 {
   const auto normal = [](const std::string& path) { return fs::path(path).lexically_normal(); };
-  for (const std::string& other : files)
-    for (const std::string& companion : CompanionPaths(other))
-      if (normal(file) == normal(companion))
-        return true;
-  return false;
+  std::set<fs::path> companions;
+  for (const std::string& file : files)
+    for (const std::string& companion : CompanionPaths(file))
+      companions.insert(normal(companion));
+  std::vector<bool> are(files.size());
+  std::transform(files.begin(), files.end(), are.begin(), [&](const auto& file) { return companions.count(normal(file)) > 0; });
+  return are;
 }
 
 void CheckOutput(const std::string& name, const std::vector<std::string>& inputs)

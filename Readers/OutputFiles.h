@@ -10,8 +10,8 @@ namespace echorama {
 /// The files that hold other arrays of the volume \a path, whether or not they are there: NAME.ValidRegion.EXT and its like.
 std::vector<std::string> CompanionPaths(const std::string& path);
 
-/// Whether \a file is no volume of its own, but belongs to another one of \a files.
-bool IsCompanion(const std::string& file, const std::vector<std::string>& files);
+/// Which of \a files are no volumes of their own, but belong to others of them.
+std::vector<bool> AreCompanions(const std::vector<std::string>& files);
 
 /// The files that hold the volume \a path and are there: it, its companions, the voxels beside a header; of a folder of slices
 /// all files in it. None: the volume is not there. Each once.

@@ -75,10 +75,11 @@ QStringList WithoutCompanions(const QStringList& files)
   std::vector<std::string> paths;
   for (const QString& file : files)
     paths.push_back(file.toStdString());
+  const std::vector<bool> areCompanions = AreCompanions(paths);
   QStringList volumes;
-  for (const QString& file : files)
-    if (!IsCompanion(file.toStdString(), paths))
-      volumes.append(file);
+  for (int i = 0; i < files.size(); i++)
+    if (!areCompanions[static_cast<std::size_t>(i)])
+      volumes.append(files[i]);
   return volumes;
 }
 

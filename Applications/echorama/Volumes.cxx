@@ -72,12 +72,13 @@ std::vector<LoadedVolume> LoadVolumes(Session& session, const std::vector<std::s
 
 std::vector<std::string> WithoutCompanions(Session& session, const std::vector<std::string>& files)
 {
+  const std::vector<bool> areCompanions = AreCompanions(files);
   std::vector<std::string> volumes;
-  for (const std::string& file : files) {
-    if (IsCompanion(file, files))
-      session.Note(file + ": not a volume of its own, but a part of one that is named too; left out");
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (areCompanions[i])
+      session.Note(files[i] + ": not a volume of its own, but a part of one that is named too; left out");
     else
-      volumes.push_back(file);
+      volumes.push_back(files[i]);
   }
   return volumes;
 }

@@ -105,18 +105,19 @@ const VolumePose& PoseFor(const std::vector<VolumePose>& poses, const std::strin
 {
   const VolumePose* found = nullptr;
   const fs::path resolved = Resolved(file);
-  for (const VolumePose& pose : poses)
-    if (Resolved(pose.file) == resolved)
-      found = &pose;
-  if (!found) {
-    for (const VolumePose& pose : poses)
-      if (fs::path(pose.file).filename() == resolved.filename()) {
-        if (found)
-          throw Error(Error::Kind::BadInput,
-                      file + ": the poses name several files " + resolved.filename().string() + ", and none in this folder");
-        found = &pose;
-      }
-  }
+  // To resolve a path asks the file system for each of its folders, so first without: as a rule poses are as ReadPoses made them.
+  for (const bool asWritten : {true, false})
+    for (std::size_t i = 0; i < poses.size() && !found; ++i)
+      if (asWritten ? poses[i].file == resolved.string() : Resolved(poses[i].file) == resolved)
+        found = &poses[i];
+  const bool isThere = found != nullptr;
+  for (std::size_t i = 0; i < poses.size() && !isThere; ++i)
+    if (fs::path(poses[i].file).filename() == resolved.filename()) {
+      if (found)
+        throw Error(Error::Kind::BadInput,
+                    file + ": the poses name several files " + resolved.filename().string() + ", and none in this folder");
+      found = &poses[i];
+    }
   if (!found)
     throw Error(Error::Kind::BadInput, file + ": the poses do not name this volume");
   if (found->geometry && !AreGridsOfOneVolume(*found->geometry, geometry))

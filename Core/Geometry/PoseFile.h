@@ -30,8 +30,7 @@ void WritePoses(const std::string& path, const std::vector<VolumePose>& poses);
 
 /// The pose of the volume \a file with \a geometry: matched by resolved path, else, when no path matches, by file name
 /// if that is unique.
-/// \throws Error(BadInput) when there is none, or when its recorded geometry is not of the same volume (so that nothing is moved
-/// twice); one at another stride is.
+/// \throws Error(BadInput) when there is none, or when it was found for another volume (so that nothing is moved twice).
 const VolumePose& PoseFor(const std::vector<VolumePose>& poses, const std::string& file, const ImageGeometry& geometry);
 
 } // namespace echorama

@@ -44,10 +44,8 @@ bool Says(const std::string& text, const std::string& words)
 TEST_F(OutputFiles, CompanionsBelongToTheirVolume)
 {
   const std::vector<std::string> files{"in/a.nii.gz", "./in/a.ValidRegion.nii.gz", "in/b.Coverage.mha", "in/a.ValidRegion.mha"};
-  EXPECT_FALSE(IsCompanion(files[0], files));
-  EXPECT_TRUE(IsCompanion(files[1], files));  // the same folder, spelled otherwise
-  EXPECT_FALSE(IsCompanion(files[2], files)); // b is not there
-  EXPECT_FALSE(IsCompanion(files[3], files)); // another format
+  // The first is a volume; the next is spelled otherwise; b is not there; the last is of another format.
+  EXPECT_EQ(AreCompanions(files), (std::vector<bool>{false, true, false, false}));
   EXPECT_EQ(CompanionPaths("a.mha").front(), "a.ValidRegion.mha");
 }
 
