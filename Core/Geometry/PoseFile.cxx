@@ -108,7 +108,7 @@ const VolumePose& PoseFor(const std::vector<VolumePose>& poses, const std::strin
   // To resolve a path asks the file system for each of its folders, so first without: as a rule poses are as ReadPoses made them.
   for (const bool asWritten : {true, false})
     for (std::size_t i = 0; i < poses.size() && !found; ++i)
-      if (asWritten ? poses[i].file == resolved.string() : Resolved(poses[i].file) == resolved)
+      if (asWritten ? poses[i].file == resolved.native() : Resolved(poses[i].file) == resolved)
         found = &poses[i];
   const bool isThere = found != nullptr;
   for (std::size_t i = 0; i < poses.size() && !isThere; ++i)
