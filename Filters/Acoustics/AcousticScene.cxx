@@ -7,8 +7,8 @@
 //    shells of both signs does a ray tell whether a negative one is a cavity or inside out.
 // 2. Rays (SceneTree). Single precision about the middle of the scene; rays that start outside of its box begin where they enter
 // it,
-//    so that far-away probes cost no precision. After the nearest hit a short ray collects all hits within the tolerance; per
-//    shell the balance of entering and leaving counts. Reflected rays may meet again the surface that they left, by rounding:
+//    so that far-away probes cost no precision. All hits within the tolerance of the nearest one are taken together; per shell
+//    the balance of entering and leaving counts. Reflected rays may meet again the surface that they left, by rounding:
 //    entering what they are in, or leaving what they are not in, changes nothing.
 // 3. Media of many points (SceneLattice).
 //
@@ -144,20 +144,13 @@ bool AcousticScene::Meet(const SceneTree::Line& line, double from, double to, Me
   if (!(begin < end))
     return false;
   thread_local std::vector<SceneTree::Hit> hits;
-  hits.resize(1);
-  const auto near = static_cast<float>(begin - line.base), slack = static_cast<float>(tolerance_);
-  ++meeting.asked;
-  if (!tree_->Nearest(line, near, static_cast<float>(end - line.base), hits[0]))
+  meeting.asked = 1;
+  if (!tree_->FirstHits(line, static_cast<float>(begin - line.base), static_cast<float>(end - line.base),
+                        static_cast<float>(tolerance_), hits))
     return false;
-  __builtin_prefetch(&triangles_[hits[0].triangle]);
-  const float first = hits[0].distance;
-  ++meeting.asked;
-  tree_->Collect(line, std::max(near, first - static_cast<float>(0.01 * tolerance_)), first + slack, hits);
 
   meeting.changes.clear();
-  float last = first;
   for (const SceneTree::Hit& hit : hits) {
-    last = std::max(last, hit.distance);
     const std::int32_t shell = triangles_[hit.triangle].shell;
     const SceneShells::Shell& about = shells_[static_cast<std::size_t>(shell)];
     const bool enters = (hit.normal.dot(line.direction) < 0.0f) == (about.facing > 0);
@@ -172,8 +165,8 @@ bool AcousticScene::Meet(const SceneTree::Line& line, double from, double to, Me
         found->hit = hit;
     }
   }
-  meeting.first = line.base + first;
-  meeting.last = line.base + last;
+  meeting.first = line.base + hits.front().distance;
+  meeting.last = line.base + hits.back().distance;
   return true;
 }
 

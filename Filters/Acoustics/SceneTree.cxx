@@ -4,6 +4,7 @@
 #include "Core/Base/Error.h"
 #include "EmbreeQuery.h"
 #include <algorithm>
+#include <tuple>
 
 namespace echorama {
 namespace {
@@ -36,25 +37,25 @@ RTCRayHit RayOf(const SceneTree::Line& line, float near, float far)
 
 struct Collector {
   EmbreeQuery query; // first, as it asks for
+  float slack, nearest, far;
   std::vector<SceneTree::Hit>* hits;
 };
 
-void CollectHits(const RTCFilterFunctionNArguments* arguments)
+// Keeps a hit, and lets Embree look for others up to the slack behind the nearest one so far (and not only before this one).
+void CollectHit(const RTCFilterFunctionNArguments* arguments)
 {
-  auto& hits = *reinterpret_cast<Collector*>(arguments->context)->hits;
-  for (unsigned int i = 0; i < arguments->N; ++i) {
-    if (arguments->valid[i] == 0)
-      continue;
-    const std::uint32_t triangle = RTCHitN_primID(arguments->hit, arguments->N, i);
-    if (std::none_of(hits.begin(), hits.end(), [triangle](const SceneTree::Hit& hit) { return hit.triangle == triangle; }))
-      hits.push_back({RTCRayN_tfar(arguments->ray, arguments->N, i),
-                      triangle,
-                      {RTCHitN_Ng_x(arguments->hit, arguments->N, i), RTCHitN_Ng_y(arguments->hit, arguments->N, i),
-                       RTCHitN_Ng_z(arguments->hit, arguments->N, i)},
-                      RTCHitN_u(arguments->hit, arguments->N, i),
-                      RTCHitN_v(arguments->hit, arguments->N, i)});
-    arguments->valid[i] = 0; // go on
-  }
+  auto& collector = *reinterpret_cast<Collector*>(arguments->context);
+  auto& hits = *collector.hits;
+  float& distance = RTCRayN_tfar(arguments->ray, 1, 0);
+  const std::uint32_t triangle = RTCHitN_primID(arguments->hit, 1, 0);
+  if (std::none_of(hits.begin(), hits.end(), [triangle](const SceneTree::Hit& hit) { return hit.triangle == triangle; }))
+    hits.push_back({distance,
+                    triangle,
+                    {RTCHitN_Ng_x(arguments->hit, 1, 0), RTCHitN_Ng_y(arguments->hit, 1, 0), RTCHitN_Ng_z(arguments->hit, 1, 0)},
+                    RTCHitN_u(arguments->hit, 1, 0),
+                    RTCHitN_v(arguments->hit, 1, 0)});
+  collector.nearest = std::min(collector.nearest, distance);
+  distance = std::min(collector.nearest + collector.slack, collector.far);
 }
 
 } // namespace
@@ -101,21 +102,18 @@ SceneTree::SceneTree(const std::vector<Eigen::Vector3f>& points, const std::vect
     throw Error(Error::Kind::NotPossible, "Embree cannot build the scene (its error " + std::to_string(problem) + ")");
 }
 
-bool SceneTree::Nearest(const Line& line, float near, float far, Hit& hit) const
+bool SceneTree::FirstHits(const Line& line, float near, float far, float slack, std::vector<Hit>& hits) const
 {
+  hits.clear();
   RTCRayHit ray = RayOf(line, near, far);
-  EmbreeQuery().Ask(scene_.get(), ray);
-  if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID)
-    return false;
-  hit = {ray.ray.tfar, ray.hit.primID, {ray.hit.Ng_x, ray.hit.Ng_y, ray.hit.Ng_z}, ray.hit.u, ray.hit.v};
-  return true;
-}
-
-void SceneTree::Collect(const Line& line, float near, float far, std::vector<Hit>& hits) const
-{
-  RTCRayHit ray = RayOf(line, near, far);
-  Collector collector{{}, &hits};
-  collector.query.Ask(scene_.get(), ray, CollectHits);
+  Collector collector{{}, slack, far, far, &hits};
+  collector.query.Ask(scene_.get(), ray, CollectHit);
+  const float last = collector.nearest + slack;
+  hits.erase(std::remove_if(hits.begin(), hits.end(), [last](const Hit& hit) { return hit.distance > last; }), hits.end());
+  // Whatever the order in which the tree came upon them.
+  std::sort(hits.begin(), hits.end(),
+            [](const Hit& a, const Hit& b) { return std::tie(a.distance, a.triangle) < std::tie(b.distance, b.triangle); });
+  return !hits.empty();
 }
 
 } // namespace echorama

@@ -36,11 +36,9 @@ public:
   SceneTree(const std::vector<Eigen::Vector3f>& points, const std::vector<std::array<std::uint32_t, 3>>& triangles,
             const std::vector<std::uint32_t>& kept);
 
-  /// The first hit from \a near to \a far. \returns false when there is none. Thread safe, as is the next.
-  bool Nearest(const Line& line, float near, float far, Hit& hit) const;
-
-  /// Adds all hits in between but those of triangles that are in the list.
-  void Collect(const Line& line, float near, float far, std::vector<Hit>& hits) const;
+  /// The first hit from \a near to \a far, and all others up to \a slack behind it, each triangle once, by distance. \returns
+  /// false when there is none. Thread safe.
+  bool FirstHits(const Line& line, float near, float far, float slack, std::vector<Hit>& hits) const;
 
   std::int64_t Bytes() const { return *bytes_; }
 

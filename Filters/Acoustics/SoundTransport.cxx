@@ -4,8 +4,7 @@
 // interface a reflected way is put aside; when a way is done, its reflections are followed in order, each with all of its own
 // before the next. Nothing is drawn at random but the reflections of rough surfaces.
 //
-// Cost: two questions to the scene's tree per surface (the nearest hit, and what lies at the same place), one at the end of
-// each way.
+// Cost: one question to the scene's tree per surface, and one at the end of each way.
 #include "SoundTransport.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"

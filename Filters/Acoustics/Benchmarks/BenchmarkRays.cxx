@@ -175,18 +175,12 @@ void Transport(const AcousticScene& scene, const Block& block, const std::string
   const SoundTracer tracer(scene, SoundTransport(), SoundConditions());
   const SceneTree tree = TreeOf(block.surface);
   const auto tolerance = static_cast<float>(scene.Tolerance());
-  // Where a question finds a surface, it is asked for others there, as transport does. Returns how often the tree was asked.
-  const auto answer = [&tree, tolerance](const Question& question, std::vector<SceneTree::Hit>& hits) {
-    hits.resize(1);
-    if (!tree.Nearest(question.line, tolerance, question.far, hits[0]))
-      return 1;
-    tree.Collect(question.line, hits[0].distance, hits[0].distance + tolerance, hits);
-    return 2;
+  const auto answer = [&tree, tolerance](const Question& question, std::vector<SceneTree::Hit>& found) {
+    return tree.FirstHits(question.line, tolerance, question.far, tolerance, found);
   };
   std::vector<std::vector<Question>> ends(planes); // of all pieces of the ways
   std::vector<Question> primary;
-  std::vector<SceneTree::Hit> hits;
-  double segments = 0.0, questions = 0.0, asked = 0.0;
+  double segments = 0.0, questions = 0.0;
   std::vector<SoundSegment> some; // the paths of one beam in 61
   for (std::size_t k = 0; k < planes; ++k)
     for (std::size_t j = 0; j < elements; ++j) {
@@ -194,10 +188,8 @@ void Transport(const AcousticScene& scene, const Block& block, const std::string
       const RayStart& start = starts[k * elements + j];
       tracer.Trace(start, path);
       primary.push_back(QuestionOf(start.origin, start.direction, probe.depthMax));
-      for (const SoundSegment& segment : path.segments) {
+      for (const SoundSegment& segment : path.segments)
         ends[k].push_back(QuestionOf(segment.from, segment.direction, segment.length + scene.Tolerance()));
-        asked += answer(ends[k].back(), hits);
-      }
       segments += static_cast<double>(path.segments.size());
       if ((k * elements + j) % 61 == 0)
         some.insert(some.end(), path.segments.begin(), path.segments.end());
@@ -258,7 +250,7 @@ void Transport(const AcousticScene& scene, const Block& block, const std::string
                                   {"questions", rays},
                                   {"segments", segments},
                                   {"rays_per_second", rays / clock},
-                                  {"share_of_bare_rate", rays / processorSeconds * bareProcessor / asked},
+                                  {"share_of_bare_rate", rays / processorSeconds * bareProcessor / segments},
                                   {"runs", 7},
                                   {"threads", tbb::info::default_concurrency()}};
   };
@@ -272,13 +264,13 @@ void Transport(const AcousticScene& scene, const Block& block, const std::string
                     static_cast<double>(contradicted) / static_cast<double>(some.size()), "share of segments with another end",
                     more);
   benchmark::ReportTime("rays", name + ", 128 x 128 beams", "the ends of its ways by bare Embree (peer)", bare,
-                        numbers(bare, bareProcessor, asked));
+                        numbers(bare, bareProcessor, segments));
 
   const double seconds = benchmark::MedianSeconds([&] {
     ParallelRanges(static_cast<std::ptrdiff_t>(primary.size()), 1024, Progress(), [&](std::ptrdiff_t begin, std::ptrdiff_t end) {
-      SceneTree::Hit hit;
+      std::vector<SceneTree::Hit> hits;
       for (auto n = static_cast<std::size_t>(begin); n < static_cast<std::size_t>(end); ++n)
-        tree.Nearest(primary[n].line, 0.0f, primary[n].far, hit);
+        tree.FirstHits(primary[n].line, 0.0f, primary[n].far, tolerance, hits);
     });
   });
   benchmark::ReportTime("rays", name + ", first rays alone", "Embree, one by one", seconds,
