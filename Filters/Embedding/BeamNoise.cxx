@@ -192,6 +192,19 @@ std::vector<float> PointSpread(double length)
   return weights;
 }
 
+// The filters along depth, fan and sweep, for \a all samples, beams and steps.
+std::array<std::vector<float>, 3> PointSpreads(const BeamNoiseParameters& parameters, const ProbeGeometry& geometry,
+                                               const std::array<int, 3>& all)
+{
+  return {PointSpread(parameters.depthCorrelationMm / (geometry.depthMax - geometry.depthMin) * (all[0] - 1)),
+          PointSpread(parameters.fanCorrelation * (all[1] - 1)), PointSpread(parameters.sweepCorrelation * (all[2] - 1))};
+}
+
+int RadiusOf(const std::vector<float>& taps)
+{
+  return static_cast<int>(taps.size() / 2);
+}
+
 // What stands for an envelope: a table of the increasing curve from the envelope of unit normals to intensities.
 class Development {
 public:
@@ -300,6 +313,12 @@ std::array<int, 3> BeamNoiseSize(const BeamNoiseParameters& parameters, const Pr
   return {parameters.samples, parameters.elements, geometry.IsPlane() ? 1 : parameters.steps};
 }
 
+std::array<int, 3> BeamNoiseReach(const BeamNoiseParameters& parameters, const ProbeGeometry& geometry)
+{
+  const auto spreads = PointSpreads(parameters, geometry, BeamNoiseSize(parameters, geometry));
+  return {RadiusOf(spreads[0]), RadiusOf(spreads[1]), RadiusOf(spreads[2])};
+}
+
 Volume<float> MakeBeamNoise(const BeamNoiseParameters& parameters, const ProbeGeometry& geometry, const Progress& progress)
 {
   Check(parameters, geometry);
@@ -317,11 +336,9 @@ Volume<float> MakeBeamNoise(const BeamNoiseParameters& parameters, const ProbeGe
     if (first[axis] < 0 || size[axis] < 1 || first[axis] > all[axis] - size[axis])
       throw Error(Error::Kind::BadInput, "noise: the part that is asked for is not one of the whole");
   const int samples = size[0], elements = size[1], steps = size[2];
-  const auto alongDepth = PointSpread(parameters.depthCorrelationMm / (geometry.depthMax - geometry.depthMin) * (all[0] - 1));
-  const auto acrossFan = PointSpread(parameters.fanCorrelation * (all[1] - 1));
-  const auto alongSweep = PointSpread(parameters.sweepCorrelation * (all[2] - 1));
-  const auto radius = [](const std::vector<float>& taps) { return static_cast<int>(taps.size() / 2); };
-  const int depthRadius = radius(alongDepth), fanRadius = radius(acrossFan), sweepRadius = radius(alongSweep);
+  const auto spreads = PointSpreads(parameters, geometry, all);
+  const std::vector<float>&alongDepth = spreads[0], &acrossFan = spreads[1], &alongSweep = spreads[2];
+  const int depthRadius = RadiusOf(alongDepth), fanRadius = RadiusOf(acrossFan), sweepRadius = RadiusOf(alongSweep);
   const Development development(parameters);
 
   const std::ptrdiff_t planeSize = static_cast<std::ptrdiff_t>(samples) * elements;

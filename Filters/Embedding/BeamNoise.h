@@ -59,6 +59,9 @@ Volume<float> MakeBeamNoise(const BeamNoiseParameters& parameters, const ProbeGe
 /// How many samples, beams and steps the whole has.
 std::array<int, 3> BeamNoiseSize(const BeamNoiseParameters& parameters, const ProbeGeometry& geometry);
 
+/// How many samples, beams and steps beyond a part of it are made on either side to make that part.
+std::array<int, 3> BeamNoiseReach(const BeamNoiseParameters& parameters, const ProbeGeometry& geometry);
+
 /// The parameters with as many samples, elements and steps as the correlation lengths need, \a perLength to each: with 3 the
 /// deviation after scan conversion is nowhere more than 6% lower (12% of log-compressed greys) than that of the samples. Where a
 /// length is 0 the count stays. Counts are at most those that make \a maximumSamples of them together: beyond, all three are

@@ -228,19 +228,13 @@ void CheckSomeData(VolumeView<const unsigned char> region)
     throw Error(Error::Kind::BadInput, "embedding: no voxel of the data is valid");
 }
 
-// Noise that has the levels, and the data over it. \a first: where this part begins on the grid of the levels.
-template <class T>
-void Render(const EmbedParameters& parameters, const EmbedLevels& levels, const std::array<int, 3>& first, const Masks& masks,
-            VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing, VolumeView<float> noise,
-            VolumeView<const unsigned char> form, VolumeView<T> intensity, VolumeView<unsigned char> labels,
-            const LocalStatistics* statistics, const Progress& progress)
+// Gives grain the levels where background shows. \a first: where this part begins on the grid of the levels.
+void ApplyLevels(const EmbedParameters& parameters, const EmbedLevels& levels, const std::array<int, 3>& first,
+                 VolumeView<const unsigned char> shown, VolumeView<float> noise, const Progress& progress)
 {
-  const auto& n = intensity.Dimensions();
-  const VolumeView<const unsigned char> shown = masks.shown.View();
-  const ToneMappingParameters tone{parameters.smoothMm, parameters.matchContrast};
-  ExtractGrain(tone, noise, form, spacing, noise, progress.Part(0.0, 0.5), shown);
+  const auto& n = noise.Dimensions();
   const BlockRows rows(levels.blocks, {levels.mean.View(), levels.deviation.View()});
-  ParallelFor(n[2], progress.Part(0.5, 0.6), [&](std::ptrdiff_t slice) {
+  ParallelFor(n[2], progress, [&](std::ptrdiff_t slice) {
     const int k = static_cast<int>(slice);
     std::vector<double> values(2 * static_cast<std::size_t>(n[0]));
     double* const local[2] = {values.data(), values.data() + n[0]};
@@ -261,8 +255,11 @@ void Render(const EmbedParameters& parameters, const EmbedLevels& levels, const 
                             : std::numeric_limits<float>::quiet_NaN();
     }
   });
-  Feather<T>(parameters, masks.weights.View(), region, noise, form, spacing, intensity, labels, progress.Part(0.6, 1.0),
-             statistics);
+}
+
+ToneMappingParameters ToneOf(const EmbedParameters& parameters)
+{
+  return {parameters.smoothMm, parameters.matchContrast};
 }
 
 } // namespace
@@ -281,8 +278,11 @@ void Embed(const EmbedParameters& parameters, VolumeView<const unsigned char> re
       GrainStatistics(VolumeView<const T>(intensity), region, spacing, parameters.smoothMm, progress.Part(0.15, 0.25));
   const EmbedLevels levels =
       Spread<T>(parameters, statistics, intensity, region, spacing, masks.shown.View(), progress.Part(0.25, 0.5));
-  Render<T>(parameters, levels, {0, 0, 0}, masks, region, spacing, noise, form, intensity, labels, &statistics,
-            progress.Part(0.5, 1.0));
+  const VolumeView<const unsigned char> shown = masks.shown.View();
+  ExtractGrain(ToneOf(parameters), noise, form, spacing, noise, progress.Part(0.5, 0.75), shown);
+  ApplyLevels(parameters, levels, {0, 0, 0}, shown, noise, progress.Part(0.75, 0.8));
+  Feather<T>(parameters, masks.weights.View(), region, noise, form, spacing, intensity, labels, progress.Part(0.8, 1.0),
+             &statistics);
 }
 
 template <class T>
@@ -300,10 +300,10 @@ EmbedLevels LevelsAround(const EmbedParameters& parameters, VolumeView<const uns
 }
 
 template <class T>
-void EmbedPart(const EmbedParameters& parameters, const EmbedLevels& levels, const std::array<int, 3>& first,
-               VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing, VolumeView<float> noise,
-               VolumeView<const unsigned char> form, VolumeView<T> intensity, VolumeView<unsigned char> labels,
-               const Progress& progress)
+void EmbedPart(const EmbedParameters& parameters, const EmbedLevels& levels, const EmbedStatistics& statistics,
+               const std::array<int, 3>& first, const GridBox& wanted, VolumeView<const unsigned char> region,
+               const Eigen::Vector3d& spacing, VolumeView<float> noise, VolumeView<const unsigned char> form,
+               VolumeView<T> intensity, VolumeView<unsigned char> labels, const Progress& progress)
 {
   CheckRanges(parameters);
   const auto& n = intensity.Dimensions();
@@ -311,8 +311,23 @@ void EmbedPart(const EmbedParameters& parameters, const EmbedLevels& levels, con
   for (std::size_t axis = 0; axis < 3; ++axis)
     if (first[axis] < 0 || first[axis] > levels.blocks.voxels[axis] - n[axis])
       throw Error(Error::Kind::BadInput, "embedding: the part is not one of the grid");
-  const Masks masks(parameters, region, spacing, form, progress.Part(0.0, 0.3));
-  Render<T>(parameters, levels, first, masks, region, spacing, noise, form, intensity, labels, nullptr, progress.Part(0.3, 1.0));
+  Masks masks(parameters, region, spacing, form, progress.Part(0.0, 0.4));
+  ParallelFor(n[2], [&](std::ptrdiff_t slice) {
+    const int k = static_cast<int>(slice);
+    for (int j = 0; j < n[1]; ++j) {
+      unsigned char* const row = masks.shown.View().Row(j, k);
+      const bool isAny = wanted.HasRow(j, k);
+      std::fill(row, row + (isAny ? wanted.first[0] : n[0]), static_cast<unsigned char>(0));
+      std::fill(row + (isAny ? wanted.first[0] + wanted.size[0] : n[0]), row + n[0], static_cast<unsigned char>(0));
+    }
+  });
+  const VolumeView<const unsigned char> shown = masks.shown.View();
+  ExtractGrain(ToneOf(parameters), statistics.noise.From(first), statistics.grain.From(first), noise, shown,
+               progress.Part(0.4, 0.7));
+  ApplyLevels(parameters, levels, first, shown, noise, progress.Part(0.7, 0.8));
+  const LocalStatistics own = statistics.data.From(first), others = statistics.background.From(first);
+  Feather<T>(parameters, masks.weights.View(), region, noise, form, spacing, intensity, labels, progress.Part(0.8, 1.0), &own,
+             &others);
 }
 
 #define EchoramaInstantiate(T)                                                                                                   \
@@ -320,8 +335,8 @@ void EmbedPart(const EmbedParameters& parameters, const EmbedLevels& levels, con
                       VolumeView<const unsigned char>, VolumeView<T>, VolumeView<unsigned char>, const Progress&);               \
   template EmbedLevels LevelsAround(const EmbedParameters&, VolumeView<const unsigned char>, const Eigen::Vector3d&,             \
                                     VolumeView<const unsigned char>, VolumeView<const T>, const Progress&);                      \
-  template void EmbedPart(const EmbedParameters&, const EmbedLevels&, const std::array<int, 3>&,                                 \
-                          VolumeView<const unsigned char>, const Eigen::Vector3d&, VolumeView<float>,                            \
+  template void EmbedPart(const EmbedParameters&, const EmbedLevels&, const EmbedStatistics&, const std::array<int, 3>&,         \
+                          const GridBox&, VolumeView<const unsigned char>, const Eigen::Vector3d&, VolumeView<float>,            \
                           VolumeView<const unsigned char>, VolumeView<T>, VolumeView<unsigned char>, const Progress&);
 ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
 #undef EchoramaInstantiate

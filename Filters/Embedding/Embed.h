@@ -6,7 +6,8 @@
 #include "Core/Imaging/VolumeView.h"
 #include "Diffusion.h"
 #include "Feather.h"
-#include <algorithm>
+#include "Filters/Stitching/GridBox.h"
+#include "LocalStatistics.h"
 
 namespace echorama {
 
@@ -52,19 +53,19 @@ EmbedLevels LevelsAround(const EmbedParameters& parameters, VolumeView<const uns
                          const Eigen::Vector3d& spacing, VolumeView<const unsigned char> form, VolumeView<const T> intensity,
                          const Progress& progress = {});
 
-/// The second half, for a part of the grid of the levels that begins at voxel \a first. Voxels nearer to the border of the part
-/// than HaloMm, where that is not a border of the grid as well, are not those of the whole.
+/// Local statistics of the whole grid, wherever a part of it is read: of the noise as it is and after the first round of
+/// ExtractGrain, of the data, and the means of the background.
+struct EmbedStatistics {
+  LocalStatistics noise, grain, data, background;
+};
+
+/// The second half, for a part of the grid of the levels that begins at voxel \a first. Only its box \a wanted is made; region
+/// and form must be there as far around it as the feather reaches, and where the grid does not end.
 /// \throws as Embed, but a part may be without data
 template <class T>
-void EmbedPart(const EmbedParameters& parameters, const EmbedLevels& levels, const std::array<int, 3>& first,
-               VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing, VolumeView<float> noise,
-               VolumeView<const unsigned char> form, VolumeView<T> intensity, VolumeView<unsigned char> labels,
-               const Progress& progress = {});
-
-/// How far the neighbourhood of a voxel reaches: the windows of local statistics, or the feather.
-inline double HaloMm(const EmbedParameters& parameters)
-{
-  return std::max(4.0 * parameters.smoothMm, parameters.featherMm);
-}
+void EmbedPart(const EmbedParameters& parameters, const EmbedLevels& levels, const EmbedStatistics& statistics,
+               const std::array<int, 3>& first, const GridBox& wanted, VolumeView<const unsigned char> region,
+               const Eigen::Vector3d& spacing, VolumeView<float> noise, VolumeView<const unsigned char> form,
+               VolumeView<T> intensity, VolumeView<unsigned char> labels, const Progress& progress = {});
 
 } // namespace echorama

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// The grid is the coarse one with factor^3 voxels in the place of each. A slab is made in bricks with a halo, whose width is that
-// of the windows in which the noise loses its own levels: so what they share with their neighbours comes out as that of these.
+// The grid is the coarse one with factor^3 voxels in the place of each. Noise and data have local statistics in windows that
+// reach far beyond a slab, but these are made of sums over blocks of voxels: those of the data are kept as they are taken, and
+// noise is made once for its sums, slices of blocks ahead of the slab, and once more for the bricks that the slab is made of.
+// These need a halo no wider than the feather, and how the grid is cut makes no difference.
 #include "EmbedSlabs.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/FormatText.h"
@@ -11,6 +13,7 @@
 #include "EmbedGrid.h"
 #include "FanNoise.h"
 #include "Filters/Stitching/StitchSampler.h"
+#include "ToneMapping.h"
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -20,9 +23,10 @@ namespace echorama {
 
 namespace {
 
-constexpr int brickEdge = 256; // voxels along x and y, without the halo
-constexpr int grainEdge = 160; // of the brick on which the grain is measured
-constexpr int leastSlices = 8; // of a slab
+constexpr int brickEdge = 256;   // voxels along x and y, without the halo
+constexpr int aheadSlices = 128; // of noise, at a time, for its sums
+constexpr int grainEdge = 160;   // of the brick on which the grain is measured
+constexpr int leastSlices = 8;   // of a slab
 constexpr int mostSlices = 256;
 
 std::string Gigabytes(double bytes)
@@ -120,6 +124,10 @@ public:
       grid_.dimensions[axis] = factor_ * grid.geometry.dimensions[axis];
     }
     grid_.origin = data_.IndexToWorld() * Eigen::Vector3d(-offset_[0], -offset_[1], -offset_[2]);
+    blocks_ = Blocks(grid_.dimensions, grid_.spacing, settings_.embed.smoothMm / 1.5);
+    noiseSums_ = dataSums_ = BlockSums(blocks_, 0);
+    reach_ = LocalStatistics::Reach(blocks_, grid_.spacing, settings_.embed.smoothMm);
+    MeasureGrain(progress.Part(0.2, 0.4)); // and with it the feather
     int slices = mostSlices;
     while (slices > leastSlices && SlabBytes(slices) > settings_.bytes)
       slices = std::max(leastSlices, slices * 3 / 4);
@@ -128,47 +136,61 @@ public:
                                              SizeText(grid_.dimensions) + " voxels, and " + Gigabytes(settings_.bytes) +
                                              " are allowed");
     slabs_ = (grid_.dimensions[2] + slices - 1) / slices;
-    MeasureGrain(progress.Part(0.2, 0.4));
     FindLevels(grid, progress.Part(0.4, 1.0));
   }
 
   std::pair<int, int> Missing(int first, int end) const override
   {
     const auto [from, to] = Needed(first, end);
-    return there_.first <= from && from < there_.second ? std::pair(std::max(from, there_.second), std::max(to, there_.second))
-                                                        : std::pair(from, to);
+    return IsKept(first, from) ? std::pair(std::max(from, taken_.second), std::max(to, taken_.second)) : std::pair(from, to);
   }
 
   void Take(int first, int count, const void* intensity, const unsigned char* region) override
   {
-    if (first != there_.second) { // what is there is of no use beside it
+    if (first != taken_.second) { // what is there is of no use beside it
       held_.clear();
-      there_ = {first, first};
+      taken_ = {first, first};
     }
+    if (taken_.first == taken_.second)
+      dataSums_ = BlockSums(blocks_, std::max(0, first + offset_[2]) / blocks_.size[2]);
     const auto size = static_cast<std::ptrdiff_t>(SliceSize());
     for (int k = 0; k < count; ++k) {
       const T* const voxels = static_cast<const T*>(intensity) + size * k;
       held_.push_back({{voxels, voxels + size}, {region + size * k, region + size * (k + 1)}});
     }
-    there_.second = first + count;
+    taken_.second = first + count;
+    AddData(first, count);
   }
 
   void Render(int first, int count, void* intensity, unsigned char* region, unsigned char* labels,
               const Progress& progress) override
   {
     const auto [from, to] = Needed(first, first + count);
-    if (from < to && (there_.first > from || there_.second < to))
+    if (from < to && (!IsKept(first, from) || taken_.second < to))
       throw Error(Error::Kind::InvalidParameter, "embedding by slabs: slices of the data are missing");
-    Forget(from);
+    const auto around = BlocksFor(first, first + count, reach_), farther = BlocksFor(first, first + count, 2 * reach_);
+    while (!held_.empty() && FirstOfHeld() < FirstNeeded(first))
+      held_.pop_front();
+    dataSums_.Forget(around.first);
+    taken_.first = std::clamp(from, taken_.first, taken_.second);
+    const double ahead = LookAhead(farther, count, progress);
+    const ToneMappingParameters tone{settings_.embed.smoothMm, settings_.embed.matchContrast};
+    const auto statistics = [&](const BlockSums& sums, const std::pair<int, int>& slices) {
+      return LocalStatistics(sums, slices.first, slices.second, grid_.spacing, tone.smoothMm);
+    };
+    const LocalStatistics noise = statistics(noiseSums_, farther);
+    const EmbedStatistics all{noise, statistics(SumsOfFirstRound(tone, noiseSums_, noise, around.first, around.second), around),
+                              statistics(dataSums_, around), LocalStatistics(levels_.blocks, levels_.mean.View())};
     const auto& n = grid_.dimensions;
     const std::array<int, 3> size{n[0], n[1], count};
     const VolumeView<T> out(static_cast<T*>(intensity), size);
     const VolumeView<unsigned char> real(region, size), what(labels, size);
     const int across = (n[0] + brickEdge - 1) / brickEdge, bricks = across * ((n[1] + brickEdge - 1) / brickEdge);
+    const Progress last = progress.Part(ahead, 1.0);
     for (int b = 0; b < bricks; ++b) {
       const std::array<int, 3> at{b % across * brickEdge, b / across * brickEdge, first};
       const std::array<int, 3> edge{std::min(brickEdge, n[0] - at[0]), std::min(brickEdge, n[1] - at[1]), count};
-      RenderBrick(at, edge, first, out, real, what, progress.Part(static_cast<double>(b) / bricks, (b + 1.0) / bricks));
+      RenderBrick(at, edge, all, out, real, what, last.Part(static_cast<double>(b) / bricks, (b + 1.0) / bricks));
     }
     progress(1.0);
   }
@@ -187,14 +209,9 @@ private:
   {
     return std::min(factor_ * cell + (factor_ - 1) / 2, data_.dimensions[axis] - 1);
   }
-  int Halo(std::size_t axis) const
+  int Halo(std::size_t axis) const // of a brick
   {
-    return static_cast<int>(std::ceil(HaloMm(settings_.embed) / data_.spacing[static_cast<Eigen::Index>(axis)])) + 2;
-  }
-
-  int BlockSize(std::size_t axis) const // of local statistics
-  {
-    return Blocks(grid_.dimensions, grid_.spacing, settings_.embed.smoothMm / 1.5).size[axis];
+    return static_cast<int>(std::ceil(settings_.embed.featherMm / data_.spacing[static_cast<Eigen::Index>(axis)])) + 1;
   }
 
   // What looking takes; a grid around the data is taken to be up to twice as large.
@@ -207,32 +224,123 @@ private:
     return EmbedMemory(settings_.embed, grid) + static_cast<double>(grid.VoxelCount()) * (2.0 * sizeof(T) + 4.0);
   }
 
-  // What making a slab takes: slices of the data, the slab, and a brick.
+  // What making a slab takes: slices of the data, the slab, a brick, and the sums and statistics of blocks.
   double SlabBytes(int slices) const
   {
     const auto& n = grid_.dimensions;
-    ImageGeometry brick = grid_;
-    brick.dimensions = {std::min(n[0], brickEdge + 2 * Halo(0) + BlockSize(0)),
-                        std::min(n[1], brickEdge + 2 * Halo(1) + BlockSize(1)),
-                        std::min(n[2], slices + 2 * Halo(2) + BlockSize(2))};
-    const double held =
-        static_cast<double>(SliceSize()) * std::min(data_.dimensions[2], slices + 2 * Halo(2) + BlockSize(2)) * (sizeof(T) + 1.0);
-    return held + static_cast<double>(SliceSize()) * slicesAtATime_ * (sizeof(T) + 1.0) +
-           static_cast<double>(n[0]) * n[1] * slices * (sizeof(T) + 2.0) + EmbedMemory(settings_.embed, brick) +
-           static_cast<double>(brick.VoxelCount()) * (sizeof(T) + 6.0);
+    const double held = std::min(data_.dimensions[2], slices + Halo(2) + (reach_ + 2) * blocks_.size[2]) + slicesAtATime_;
+    double brick = 1.0;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      brick *= std::min(n[axis], (axis < 2 ? brickEdge : slices) + 2 * Halo(axis));
+    const double ahead = 5.0 * AheadEdge(0) * AheadEdge(1) * AheadEdge(2);
+    const double blocks = static_cast<double>(blocks_.count[0]) * blocks_.count[1] *
+                          std::min(blocks_.count[2], slices / blocks_.size[2] + 4 * reach_ + 3);
+    const double levels = std::min(static_cast<double>(grid_.VoxelCount()), 1.0 * settings_.embed.diffusionVoxels);
+    // Noise and weights are floats; form, valid region, labels and masks a byte each. Of sums and statistics there are three of
+    // either, of three numbers. Made noise is held along its beams, in some 16 million samples at most.
+    return static_cast<double>(SliceSize()) * held * (sizeof(T) + 1.0) +
+           static_cast<double>(n[0]) * n[1] * slices * (sizeof(T) + 2.0) + std::max(brick * (sizeof(T) + 14.0), ahead) +
+           6.0 * 24.0 * blocks + 32.0 * levels + 0.3e9;
   }
 
-  // Slices of the data that slices of the grid are made of.
+  int AheadEdge(std::size_t axis) const // voxels of a part that noise is made in for its sums: whole blocks
+  {
+    const int most = axis < 2 ? brickEdge : aheadSlices;
+    return std::min(std::max(1, most / blocks_.size[axis]) * blocks_.size[axis], grid_.dimensions[axis]);
+  }
+
+  // The slices of blocks that slices [first, end) of the grid lie between, and so many more on either side.
+  std::pair<int, int> BlocksFor(int first, int end, int beyond) const
+  {
+    return {std::max(0, static_cast<int>(blocks_.PositionOf(first, 2)) - beyond),
+            std::min(blocks_.count[2], static_cast<int>(blocks_.PositionOf(end - 1, 2)) + 2 + beyond)};
+  }
+
+  // Slices of the data that slices of the grid are made of: of the first of them the sums alone.
   std::pair<int, int> Needed(int first, int end) const
   {
-    const int from = std::clamp(first - Halo(2) - BlockSize(2) - offset_[2], 0, data_.dimensions[2]);
-    return {from, std::max(from, std::clamp(end + Halo(2) - offset_[2], 0, data_.dimensions[2]))};
+    const auto [from, to] = BlocksFor(first, end, reach_);
+    const auto clamped = [this](int slice) { return std::clamp(slice - offset_[2], 0, data_.dimensions[2]); };
+    const int begin = clamped(std::min(first - Halo(2), from * blocks_.size[2]));
+    return {begin, std::max(begin, clamped(std::max(end + Halo(2), to * blocks_.size[2])))};
   }
 
-  void Forget(int before)
+  int FirstOfHeld() const { return taken_.second - static_cast<int>(held_.size()); }
+  // The first slice of the data that is needed itself for slices of the grid from \a first on.
+  int FirstNeeded(int first) const { return std::clamp(first - Halo(2) - offset_[2], 0, data_.dimensions[2]); }
+
+  // Whether those that were taken go on with what is needed for slices of the grid from \a first on.
+  bool IsKept(int first, int from) const
   {
-    for (; there_.first < std::min(before, there_.second); ++there_.first)
-      held_.pop_front();
+    return taken_.first <= from && from <= taken_.second && FirstOfHeld() <= FirstNeeded(first);
+  }
+
+  void AddData(int first, int count)
+  {
+    const auto& n = grid_.dimensions;
+    const int begin = std::max(0, first + offset_[2]), end = std::min(first + count + offset_[2], n[2]);
+    const int skip = std::max(0, -offset_[0]), size = std::min(data_.dimensions[0], n[0] - offset_[0]) - skip;
+    if (begin >= end || size <= 0)
+      return;
+    dataSums_.Grow((end + blocks_.size[2] - 1) / blocks_.size[2]);
+    ParallelFor(blocks_.count[1], [&](std::ptrdiff_t J) {
+      for (int k = begin; k < end; ++k) {
+        const Slice& slice = held_[held_.size() - static_cast<std::size_t>(taken_.second + offset_[2] - k)];
+        for (int j = static_cast<int>(J) * blocks_.size[1]; j < std::min((static_cast<int>(J) + 1) * blocks_.size[1], n[1]); ++j)
+          if (const int y = j - offset_[1]; y >= 0 && y < data_.dimensions[1]) {
+            const auto at = static_cast<std::ptrdiff_t>(data_.dimensions[0]) * y + skip;
+            dataSums_.AddRow(skip + offset_[0], j, k, slice.voxels.data() + at, slice.isReal.data() + at, size);
+          }
+      }
+    });
+  }
+
+  // Sums of the noise for these slices of blocks. \returns the share of progress that it was, beside so many slices of a slab
+  double LookAhead(const std::pair<int, int>& slices, int rendered, const Progress& progress)
+  {
+    noiseSums_.Forget(slices.first);
+    if (noiseSums_.First() != slices.first)
+      noiseSums_ = BlockSums(blocks_, slices.first);
+    const auto& n = grid_.dimensions;
+    const int begin = noiseSums_.End() * blocks_.size[2], end = std::min(slices.second * blocks_.size[2], n[2]);
+    if (begin >= end)
+      return 0.0;
+    const double share = static_cast<double>(end - begin) / (end - begin + 2.0 * rendered);
+    const Progress own = progress.Part(0.0, share);
+    const std::array<int, 3> edge{AheadEdge(0), AheadEdge(1), AheadEdge(2)}, size = blocks_.size;
+    double done = 0.0;
+    GridBox part{{0, 0, begin}, {}};
+    for (; part.first[2] < end; part.first[2] += edge[2]) {
+      BlockSums sums(blocks_, part.first[2] / size[2]); // a whole slice of them, or none when this is cancelled
+      part.size[2] = std::min(edge[2], end - part.first[2]);
+      sums.Grow((part.first[2] + part.size[2] + size[2] - 1) / size[2]);
+      for (part.first[1] = 0; part.first[1] < n[1]; part.first[1] += edge[1])
+        for (part.first[0] = 0; part.first[0] < n[0]; part.first[0] += edge[0]) {
+          for (std::size_t axis = 0; axis < 2; ++axis)
+            part.size[axis] = std::min(edge[axis], n[axis] - part.first[axis]);
+          AddNoise(part, sums);
+          done += static_cast<double>(part.VoxelCount());
+          own(done / (static_cast<double>(n[0]) * n[1] * (end - begin)));
+        }
+      noiseSums_.Append(std::move(sums));
+    }
+    return share;
+  }
+
+  // Of a part that consists of whole blocks.
+  void AddNoise(const GridBox& part, BlockSums& sums) const
+  {
+    Volume<float> noise(part.size);
+    Volume<unsigned char> form(part.size);
+    FillFanWithNoise(noise_.parameters, form_, Cropped(grid_, part), noise.View(), form.View());
+    const int height = blocks_.size[1], depth = blocks_.size[2], rows = (part.size[1] + height - 1) / height;
+    ParallelFor(rows * ((part.size[2] + depth - 1) / depth), [&](std::ptrdiff_t row) {
+      const int J = static_cast<int>(row) % rows, K = static_cast<int>(row) / rows;
+      for (int k = K * depth; k < std::min((K + 1) * depth, part.size[2]); ++k)
+        for (int j = J * height; j < std::min((J + 1) * height, part.size[1]); ++j)
+          sums.AddRow(part.first[0], j + part.first[1], k + part.first[2], std::as_const(noise).View().Row(j, k),
+                      std::as_const(form).View().Row(j, k), part.size[0]);
+    });
   }
 
   void KeepGrain(int first, VolumeView<const T> voxels, VolumeView<const unsigned char> real, const Eigen::Vector3d& middle)
@@ -302,14 +410,15 @@ private:
     levels_.blocks.voxels = grid_.dimensions;
   }
 
-  void RenderBrick(const std::array<int, 3>& at, const std::array<int, 3>& edge, int firstSlice, VolumeView<T> out,
-                   VolumeView<unsigned char> real, VolumeView<unsigned char> what, const Progress& progress)
+  void RenderBrick(const std::array<int, 3>& at, const std::array<int, 3>& edge, const EmbedStatistics& statistics,
+                   VolumeView<T> out, VolumeView<unsigned char> real, VolumeView<unsigned char> what, const Progress& progress)
   {
     std::array<int, 3> begin{}, size{};
+    GridBox wanted{{}, edge};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       begin[axis] = std::max(0, at[axis] - Halo(axis));
-      begin[axis] -= begin[axis] % BlockSize(axis); // so that local statistics have the same blocks in all bricks
       size[axis] = std::min(grid_.dimensions[axis], at[axis] + edge[axis] + Halo(axis)) - begin[axis];
+      wanted.first[axis] = at[axis] - begin[axis];
     }
     Volume<T> intensity(size);
     Volume<unsigned char> region(size), labels(size), form(size);
@@ -320,7 +429,7 @@ private:
         const int y = j + begin[1] - offset_[1];
         if (z < 0 || z >= data_.dimensions[2] || y < 0 || y >= data_.dimensions[1] || count <= 0)
           continue;
-        const Slice& held = held_[static_cast<std::size_t>(z - there_.first)];
+        const Slice& held = held_[held_.size() - static_cast<std::size_t>(taken_.second - z)];
         const auto from = static_cast<std::ptrdiff_t>(data_.dimensions[0]) * y + x + skip;
         const auto isReal = held.isReal.begin() + from;
         std::copy_n(isReal, count, region.View().Row(j, k) + skip);
@@ -332,16 +441,16 @@ private:
       Volume<float> noise(size);
       FillFanWithNoise(noise_.parameters, form_, Cropped(grid_, {begin, size}), noise.View(), form.View(),
                        progress.Part(0.0, 0.5));
-      EmbedPart<T>(settings_.embed, levels_, begin, std::as_const(region).View(), data_.spacing, noise.View(),
+      EmbedPart<T>(settings_.embed, levels_, statistics, begin, wanted, std::as_const(region).View(), data_.spacing, noise.View(),
                    std::as_const(form).View(), intensity.View(), labels.View(), progress.Part(0.5, 1.0));
     }
     ParallelFor(edge[2], [&](std::ptrdiff_t slice) {
-      const int k = static_cast<int>(slice) + at[2];
-      for (int j = at[1]; j < at[1] + edge[1]; ++j) {
-        const int i = at[0] - begin[0], row = j - begin[1], from = k - begin[2], to = k - firstSlice;
-        std::copy_n(intensity.View().Row(row, from) + i, edge[0], out.Row(j, to) + at[0]);
-        std::copy_n(region.View().Row(row, from) + i, edge[0], real.Row(j, to) + at[0]);
-        std::copy_n(labels.View().Row(row, from) + i, edge[0], what.Row(j, to) + at[0]);
+      const int to = static_cast<int>(slice), from = to + wanted.first[2], i = wanted.first[0];
+      for (int row = 0; row < edge[1]; ++row) {
+        const int j = row + wanted.first[1];
+        std::copy_n(intensity.View().Row(j, from) + i, edge[0], out.Row(row + at[1], to) + at[0]);
+        std::copy_n(region.View().Row(j, from) + i, edge[0], real.Row(row + at[1], to) + at[0]);
+        std::copy_n(labels.View().Row(j, from) + i, edge[0], what.Row(row + at[1], to) + at[0]);
       }
     });
   }
@@ -357,8 +466,11 @@ private:
   double mostReal_ = 0.0;
   std::array<int, 3> offset_{}; // where the data begin on the grid
   EmbedLevels levels_;
-  std::deque<Slice> held_;
-  std::pair<int, int> there_{0, 0}; // slices of the data that are held, [first, second)
+  Blocks blocks_; // of local statistics
+  int reach_ = 0; // of their windows, in slices of blocks
+  BlockSums noiseSums_, dataSums_;
+  std::pair<int, int> taken_{0, 0}; // slices of the data that were taken one after the other, [first, second)
+  std::deque<Slice> held_;          // the last of these
 };
 
 } // namespace

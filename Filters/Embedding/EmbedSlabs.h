@@ -14,7 +14,8 @@ namespace echorama {
 /// The outline, and the levels that the background takes from the data, come from every so-many-th voxel along each axis (every
 /// second one at least, else at most a third of smoothMm apart): those of the whole but for what speckle makes of fewer voxels.
 /// The grain is measured on the part of one slab that holds most data. All else (noise, feather, labels) is worked out for every
-/// voxel. How the result is cut shows in few voxels of the background, which differ in the last grey level.
+/// voxel. Local statistics are those of the whole grid, so how the result is cut shows at most where rounding decides a grey
+/// level of the background, or whether a voxel at the border of the form is inside.
 class EmbedSlabs {
 public:
   struct Settings {

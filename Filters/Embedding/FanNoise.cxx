@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // A part of the grid lies between the beams that pass near a lattice of points in it. The parts are halved until these are few
-// enough; close to where all beams meet that may take parts of a few voxels.
+// enough; close to where all beams meet that may take parts of a few voxels. They are halved further where that saves samples: a
+// box of voxels that lies oblique to the beams is between few of those in the box of samples around it.
 #include "FanNoise.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/ScanConversion.h"
@@ -15,16 +16,18 @@ namespace echorama {
 
 namespace {
 
-constexpr int leastPart = 4; // voxels along an edge
+constexpr int leastPart = 4;                // voxels along an edge
+constexpr int fewSteps = 4, manySteps = 16; // of the lattice: for a comparison, and for what is made
+constexpr double saving = 0.9;              // of the samples that are made: a part is halved where it is left with less
 
-// The samples that a part of the grid lies between; none where it is beside the fan.
-GridBox BeamsAround(const PlacedProbe& fan, const std::array<int, 3>& all, const ImageGeometry& part)
+// The samples that a part of the grid lies between, and the fewer beyond them the more \a steps are looked at along each edge;
+// none where it is beside the fan.
+GridBox BeamsAround(const PlacedProbe& fan, const std::array<int, 3>& all, const ImageGeometry& part, int steps)
 {
   const ProbeGeometry& g = fan.geometry;
   GridBox box{{0, 0, 0}, all};
   const Eigen::Affine3d toProbe = fan.probeToWorld.inverse() * part.IndexToWorld();
   Eigen::AlignedBox3d range;
-  constexpr int steps = 8;
   for (int c = 0; c <= steps; ++c)
     for (int b = 0; b <= steps; ++b)
       for (int a = 0; a <= steps; ++a) {
@@ -56,6 +59,15 @@ GridBox BeamsAround(const PlacedProbe& fan, const std::array<int, 3>& all, const
   return box;
 }
 
+std::array<GridBox, 2> Halved(const GridBox& part, std::size_t axis)
+{
+  std::array<GridBox, 2> halves{part, part};
+  halves[0].size[axis] /= 2;
+  halves[1].first[axis] += halves[0].size[axis];
+  halves[1].size[axis] -= halves[0].size[axis];
+  return halves;
+}
+
 } // namespace
 
 BeamNoiseParameters ForGrid(BeamNoiseParameters parameters, const PlacedProbe& fan, const ImageGeometry& grid, std::uint64_t seed)
@@ -70,13 +82,23 @@ void FillFanWithNoise(const BeamNoiseParameters& parameters, const PlacedProbe& 
 {
   const std::array<int, 3> all = BeamNoiseSize(parameters, fan.geometry);
   const auto count = [](const GridBox& box) { return static_cast<double>(box.VoxelCount()); };
-  if (count({{0, 0, 0}, all}) <= most) {
+  const double whole = count({{0, 0, 0}, all});
+  if (whole <= most && count(BeamsAround(fan, all, grid, manySteps)) > 0.5 * whole) {
     const Volume<float> beams = MakeBeamNoise(parameters, fan.geometry, progress.Part(0.0, 0.5));
     ScanConvert<float>(beams.View(), fan.geometry, fan.probeToWorld, grid, noise, inside, progress.Part(0.5, 1.0));
     return;
   }
   std::fill(noise.begin(), noise.end(), 0.0f);
   std::fill(inside.begin(), inside.end(), static_cast<unsigned char>(0));
+  // How many samples are made for a part, those beyond it included.
+  const std::array<int, 3> reach = BeamNoiseReach(parameters, fan.geometry);
+  const auto madeFor = [&](const GridBox& part) {
+    const GridBox beams = BeamsAround(fan, all, Cropped(grid, part), fewSteps);
+    double made = beams.Empty() ? 0.0 : 1.0;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      made *= beams.size[axis] + 2.0 * reach[axis];
+    return made;
+  };
   std::vector<GridBox> parts{{{0, 0, 0}, grid.dimensions}};
   const double voxels = count(parts[0]);
   double done = 0.0;
@@ -85,13 +107,23 @@ void FillFanWithNoise(const BeamNoiseParameters& parameters, const PlacedProbe& 
     const GridBox part = parts.back();
     parts.pop_back();
     const ImageGeometry its = Cropped(grid, part);
-    const GridBox beams = BeamsAround(fan, all, its);
-    const auto longest = static_cast<std::size_t>(std::max_element(part.size.begin(), part.size.end()) - part.size.begin());
-    if (count(beams) > most && part.size[longest] > leastPart) {
-      std::array<GridBox, 2> halves{part, part};
-      halves[0].size[longest] /= 2;
-      halves[1].first[longest] += halves[0].size[longest];
-      halves[1].size[longest] -= halves[0].size[longest];
+    const GridBox beams = BeamsAround(fan, all, its, manySteps);
+    auto along = static_cast<std::size_t>(std::max_element(part.size.begin(), part.size.end()) - part.size.begin());
+    bool isHalved = count(beams) > most && part.size[along] > leastPart;
+    if (!isHalved && !beams.Empty()) {
+      double least = saving * madeFor(part);
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        if (part.size[axis] > leastPart) {
+          const std::array<GridBox, 2> halves = Halved(part, axis);
+          if (const double made = madeFor(halves[0]) + madeFor(halves[1]); made < least) {
+            least = made;
+            along = axis;
+            isHalved = true;
+          }
+        }
+    }
+    if (isHalved) {
+      const std::array<GridBox, 2> halves = Halved(part, along);
       parts.insert(parts.end(), halves.begin(), halves.end());
       continue;
     }

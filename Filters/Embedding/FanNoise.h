@@ -11,9 +11,9 @@ BeamNoiseParameters ForGrid(BeamNoiseParameters parameters, const PlacedProbe& f
                             std::uint64_t seed);
 
 /// Noise along the beams of a fan (MakeBeamNoise), scan converted to any grid, a part of the fan for instance. Where the beams
-/// that the grid lies between have more samples together than \a most, the grid is filled in parts, each from its own: the noise
-/// is the same then, to what ScanConvert rounds. \param noise, inside views of the size of \a grid, overwritten: 0 in both
-/// outside of the fan \throws as MakeBeamNoise and ScanConvert, but for the number of samples
+/// that the grid lies between have more samples together than \a most, or are few of all, the grid is filled in parts, each from
+/// its own: the noise is the same then, to what ScanConvert rounds. \param noise, inside views of the size of \a grid,
+/// overwritten: 0 in both outside of the fan \throws as MakeBeamNoise and ScanConvert, but for the number of samples
 void FillFanWithNoise(const BeamNoiseParameters& parameters, const PlacedProbe& fan, const ImageGeometry& grid,
                       VolumeView<float> noise, VolumeView<unsigned char> inside, const Progress& progress = {},
                       double most = 16e6);

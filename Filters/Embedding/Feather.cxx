@@ -76,7 +76,8 @@ void FeatherWeights(const FeatherParameters& parameters, VolumeView<const unsign
 template <class T>
 void Feather(const FeatherParameters& parameters, VolumeView<const float> weights, VolumeView<const unsigned char> region,
              VolumeView<const float> background, VolumeView<const unsigned char> backgroundRegion, const Eigen::Vector3d& spacing,
-             VolumeView<T> intensity, VolumeView<unsigned char> labels, const Progress& progress, const LocalStatistics* own)
+             VolumeView<T> intensity, VolumeView<unsigned char> labels, const Progress& progress, const LocalStatistics* own,
+             const LocalStatistics* others)
 {
   CheckRanges(parameters);
   const auto& n = intensity.Dimensions();
@@ -88,12 +89,13 @@ void Feather(const FeatherParameters& parameters, VolumeView<const float> weight
     CheckShape(n, backgroundRegion.Dimensions(), "background's region");
 
   const bool mixes = parameters.keepTexture && parameters.featherMm > 0.0;
-  std::optional<LocalStatistics> measured, others;
+  std::optional<LocalStatistics> measured, measuredOthers;
   if (mixes && !own)
     own = &measured.emplace(VolumeView<const T>(intensity), region, spacing, parameters.smoothMm, progress.Part(0.0, 0.3), 0.0,
                             true);
-  if (mixes)
-    others.emplace(background, backgroundRegion, spacing, parameters.smoothMm, progress.Part(0.3, 0.6), 0.0, true);
+  if (mixes && !others)
+    others =
+        &measuredOthers.emplace(background, backgroundRegion, spacing, parameters.smoothMm, progress.Part(0.3, 0.6), 0.0, true);
   ParallelFor(n[2], progress.Part(mixes ? 0.6 : 0.0, 1.0), [&](std::ptrdiff_t slice) {
     const int k = static_cast<int>(slice);
     std::vector<float> rows(2 * static_cast<std::size_t>(n[0]));
@@ -140,7 +142,7 @@ void Feather(const FeatherParameters& parameters, VolumeView<const float> weight
 #define EchoramaInstantiate(T)                                                                                                   \
   template void Feather(const FeatherParameters&, VolumeView<const float>, VolumeView<const unsigned char>,                      \
                         VolumeView<const float>, VolumeView<const unsigned char>, const Eigen::Vector3d&, VolumeView<T>,         \
-                        VolumeView<unsigned char>, const Progress&, const LocalStatistics*);
+                        VolumeView<unsigned char>, const Progress&, const LocalStatistics*, const LocalStatistics*);
 ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)
 #undef EchoramaInstantiate
 

@@ -41,12 +41,12 @@ void FeatherWeights(const FeatherParameters& parameters, VolumeView<const unsign
 /// from them by w / n and (1 - w) / n with n^2 = w^2 + (1 - w)^2: the mixture has the deviation of its parts, which are
 /// independent. Integers are rounded to the nearest and clamped to their range. \param weights of FeatherWeights(); \param region
 /// of the data; \param backgroundRegion where there is a background (empty: everywhere) \param labels EmbeddedVoxel of every
-/// voxel \param own the local means of the data with smoothMm, where they are known already \throws Error(BadInput) for views of
-/// different shape, Error(InvalidParameter), Error(Cancelled)
+/// voxel \param own, others the local means of the data, and of the background, with smoothMm, where they are known already
+/// \throws Error(BadInput) for views of different shape, Error(InvalidParameter), Error(Cancelled)
 template <class T>
 void Feather(const FeatherParameters& parameters, VolumeView<const float> weights, VolumeView<const unsigned char> region,
              VolumeView<const float> background, VolumeView<const unsigned char> backgroundRegion, const Eigen::Vector3d& spacing,
              VolumeView<T> intensity, VolumeView<unsigned char> labels, const Progress& progress = {},
-             const LocalStatistics* own = nullptr);
+             const LocalStatistics* own = nullptr, const LocalStatistics* others = nullptr);
 
 } // namespace echorama

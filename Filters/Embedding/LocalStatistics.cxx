@@ -15,6 +15,7 @@
 #include "Core/Imaging/VoxelTypes.h"
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <numeric>
 #include <optional>
 #include <type_traits>
@@ -110,6 +111,22 @@ std::vector<double> WindowAlong(std::size_t axis, const Blocks& blocks, const Ei
   return HalfWindow(variance > 0.0 && blocks.count[axis] > 1 ? std::sqrt(variance) / size : 0.0);
 }
 
+// Adds numbers of the voxels [begin, end) of a row to those of their blocks.
+void AddToBlocks(const double* numbers, int begin, int end, int size, double* to)
+{
+  if (size == 1) {
+    for (int i = begin; i < end; ++i)
+      to[i] += numbers[i];
+    return;
+  }
+  for (int I = begin / size, i = begin; i < end; ++I) {
+    double sum = 0.0;
+    for (const int next = std::min((I + 1) * size, end); i < next; ++i)
+      sum += numbers[i];
+    to[I] += sum;
+  }
+}
+
 // Slices [first, end) of a volume.
 template <class T>
 VolumeView<const T> SlicesOf(VolumeView<const T> volume, int first, int end)
@@ -152,6 +169,108 @@ ECHORAMA_HOT void Deviations(const double* __restrict weight, const double* __re
 }
 
 } // namespace
+
+void BlockSums::Grow(int end)
+{
+  while (End() < end)
+    slices_.emplace_back(3 * static_cast<std::size_t>(grid_.count[0]) * static_cast<std::size_t>(grid_.count[1]), 0.0);
+}
+
+void BlockSums::Append(BlockSums&& next)
+{
+  slices_.insert(slices_.end(), std::make_move_iterator(next.slices_.begin()), std::make_move_iterator(next.slices_.end()));
+}
+
+void BlockSums::Forget(int before)
+{
+  for (; first_ < before && !slices_.empty(); ++first_)
+    slices_.pop_front();
+}
+
+template <class T>
+void BlockSums::AddRow(int first, int j, int k, const T* voxels, const unsigned char* region, int count)
+{
+  int begin = 0, end = count;
+  while (region && begin < end && !region[begin])
+    ++begin;
+  while (region && begin < end && !region[end - 1])
+    --end;
+  if (begin >= end)
+    return;
+  const auto width = static_cast<std::size_t>(grid_.voxels[0]);
+  thread_local std::vector<double> ofVoxels;
+  ofVoxels.resize(3 * width);
+  double* const own[3] = {ofVoxels.data(), ofVoxels.data() + width, ofVoxels.data() + 2 * width};
+  MomentsOfVoxels(voxels - first, region ? region - first : nullptr, first + begin, first + end, 0.0, nullptr, own);
+  for (std::size_t c = 0; c < 3; ++c)
+    AddToBlocks(own[c], first + begin, first + end, grid_.size[0], Row(c, j / grid_.size[1], k / grid_.size[2]));
+}
+
+const double* BlockSums::Row(std::size_t channel, int J, int K) const
+{
+  const auto count = [this](std::size_t axis) { return static_cast<std::size_t>(grid_.count[axis]); };
+  return slices_[static_cast<std::size_t>(K - first_)].data() + (channel * count(1) + static_cast<std::size_t>(J)) * count(0);
+}
+
+double* BlockSums::Row(std::size_t channel, int J, int K)
+{
+  return const_cast<double*>(std::as_const(*this).Row(channel, J, K));
+}
+
+int LocalStatistics::Reach(const Blocks& blocks, const Eigen::Vector3d& spacing, double sigmaMm)
+{
+  return static_cast<int>(WindowAlong(2, blocks, spacing, sigmaMm).size()) - 1;
+}
+
+LocalStatistics::LocalStatistics(const BlockSums& sums, int first, int end, const Eigen::Vector3d& spacing, double sigmaMm)
+{
+  Blocks blocks = sums.Grid();
+  std::array<std::vector<double>, 3> windows;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    windows[axis] = WindowAlong(axis, blocks, spacing, sigmaMm);
+  origin_[2] = -first * blocks.size[2];
+  blocks.voxels[2] = std::min(end * blocks.size[2], blocks.voxels[2]) + origin_[2];
+  blocks.count[2] = end - first;
+  const auto& count = blocks.count;
+  const auto lattice = std::make_shared<Lattice>(blocks, 3, Zeroed<double>());
+  std::vector<SliceExtent> extents(static_cast<std::size_t>(count[2]));
+  ParallelFor(count[2], [&](std::ptrdiff_t slice) {
+    const int K = static_cast<int>(slice);
+    if (first + K < sums.First() || first + K >= sums.End())
+      return;
+    PaddedRow raw(count[0], static_cast<int>(windows[0].size()) - 1);
+    PaddedRow smoothed(count[0] * count[1], count[0] * (static_cast<int>(windows[1].size()) - 1));
+    for (std::size_t c = 0; c < 3; ++c) {
+      for (int J = 0; J < count[1]; ++J) {
+        std::copy_n(sums.Row(c, J, first + K), count[0], raw.First());
+        SumWindow(windows[0], raw.First(), 1, count[0], smoothed.First() + static_cast<std::ptrdiff_t>(J) * count[0]);
+      }
+      SumWindow(windows[1], smoothed.First(), count[0], count[0] * count[1], lattice->Channel(c).Row(0, K));
+    }
+    extents[static_cast<std::size_t>(K)].end = {count[0], count[1]};
+  });
+  ParallelFor(count[1], [&](std::ptrdiff_t J) {
+    for (std::size_t c = 0; c < 3; ++c)
+      SumWindowAlongZ(windows[2], count, extents, static_cast<int>(J), lattice->Channel(c).Data());
+  });
+  lattice_ = lattice;
+}
+
+LocalStatistics::LocalStatistics(const Blocks& blocks, VolumeView<const double> means)
+{
+  const auto lattice = std::make_shared<Lattice>(blocks, 2, Zeroed<double>());
+  std::fill(lattice->Channel(0).begin(), lattice->Channel(0).end(), 1.0);
+  std::copy(means.begin(), means.end(), lattice->Channel(1).begin());
+  lattice_ = lattice;
+}
+
+LocalStatistics LocalStatistics::From(const std::array<int, 3>& voxel) const
+{
+  LocalStatistics part = *this;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    part.origin_[axis] += voxel[axis];
+  return part;
+}
 
 template <class T>
 LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const unsigned char> region,
@@ -245,20 +364,8 @@ LocalStatistics::LocalStatistics(VolumeView<const T> intensity, VolumeView<const
           last = std::max(last, (end - 1) / blocks.size[0]);
           MomentsOfVoxels(intensity.Data() + voxels, region.Empty() ? nullptr : region.Data() + voxels, begin, end, lattice->mean,
                           trend ? around.data() : nullptr, own);
-          for (std::size_t c = 0; c < 3; ++c) {
-            double* const to = raw[c].First();
-            if (blocks.size[0] == 1) {
-              for (int i = begin; i < end; ++i)
-                to[i] += own[c][i];
-              continue;
-            }
-            for (int I = begin / blocks.size[0], i = begin; i < end; ++I) {
-              double sum = 0.0;
-              for (const int next = std::min((I + 1) * blocks.size[0], end); i < next; ++i)
-                sum += own[c][i];
-              to[I] += sum;
-            }
-          }
+          for (std::size_t c = 0; c < 3; ++c)
+            AddToBlocks(own[c], begin, end, blocks.size[0], raw[c].First());
         }
       if (last < 0) {
         clear(J, 0, count[0]);
@@ -328,14 +435,25 @@ void LocalStatistics::Row(int j, int k, int first, int end, float* mean, float* 
   thread_local std::vector<double> sums;
   sums.resize(3 * count);
   double* const rows[3] = {sums.data(), sums.data() + count, deviation ? sums.data() + 2 * count : nullptr};
-  lattice_->rows->Row(j, k, first, end, rows);
+  lattice_->rows->Row(j + origin_[1], k + origin_[2], first + origin_[0], end + origin_[0], rows);
   Means(rows[0], rows[1], static_cast<int>(count), lattice_->mean, mean);
   if (deviation)
     Deviations(rows[0], rows[1], rows[2], static_cast<int>(count), lattice_->mean, lattice_->variance, lattice_->fromTrend,
                deviation);
 }
 
+void LocalStatistics::RowOfBlocks(int J, int K, float* mean, float* deviation) const
+{
+  const int slice = K + origin_[2] / lattice_->blocks.size[2], count = lattice_->blocks.count[0];
+  const double* rows[3]{};
+  for (std::size_t c = 0; c < lattice_->channels; ++c)
+    rows[c] = lattice_->Channel(c).Row(J, slice);
+  Means(rows[0], rows[1], count, lattice_->mean, mean);
+  Deviations(rows[0], rows[1], rows[2], count, lattice_->mean, lattice_->variance, lattice_->fromTrend, deviation);
+}
+
 #define EchoramaInstantiate(T)                                                                                                   \
+  template void BlockSums::AddRow(int, int, int, const T*, const unsigned char*, int);                                           \
   template LocalStatistics::LocalStatistics(VolumeView<const T>, VolumeView<const unsigned char>, const Eigen::Vector3d&,        \
                                             double, const Progress&, double, bool, LocalStatistics*, const double*);
 ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaInstantiate)

@@ -3,6 +3,7 @@
 #include "Core/Base/Parameters.h"
 #include "Core/Base/Progress.h"
 #include "Core/Imaging/VolumeView.h"
+#include "LocalStatistics.h"
 
 namespace echorama {
 
@@ -25,6 +26,16 @@ ParameterList Describe(ToneMappingParameters& p);
 void ExtractGrain(const ToneMappingParameters& parameters, VolumeView<const float> intensity,
                   VolumeView<const unsigned char> region, const Eigen::Vector3d& spacing, VolumeView<float> grain,
                   const Progress& progress = {}, VolumeView<const unsigned char> wanted = {});
+
+///@{ The same for noise that is never there as a whole: from \a sums over the blocks of its whole grid come those of what the
+/// first round leaves of it, for slices of blocks [begin, end), and from the statistics of both the grain of any part. Within a
+/// block they take local mean and deviation as those of its middle: for noise, which has no slope of its own, that is within
+/// a thousandth of its deviation. Where the deviation is 0 there is no grain.
+BlockSums SumsOfFirstRound(const ToneMappingParameters& parameters, const BlockSums& sums, const LocalStatistics& first,
+                           int begin, int end);
+void ExtractGrain(const ToneMappingParameters& parameters, const LocalStatistics& first, const LocalStatistics& second,
+                  VolumeView<float> noise, VolumeView<const unsigned char> wanted, const Progress& progress = {});
+///@}
 
 /// The reverse, for one voxel: grain on a local mean, and with matchDeviation of a local deviation (dissertation 6.6).
 inline float ApplyGrain(bool matchDeviation, float grain, float mean, float deviation)

@@ -40,6 +40,22 @@ TEST(FanNoise, PartsAreThoseOfTheWhole)
     EXPECT_EQ(other, 0);
     EXPECT_GT(shown, 300);
     EXPECT_LT(worst, 0.5); // of 255 greys, between samples that differ by up to all of them
+    // A small part of the grid, which lies between few of the samples.
+    ImageGeometry corner = grid;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      corner.dimensions[axis] = (grid.dimensions[axis] + 2) / 3;
+    const std::array<int, 3> first{grid.dimensions[0] / 3, grid.dimensions[1] / 3, grid.dimensions[2] / 2};
+    corner.origin = grid.IndexToWorld() * Eigen::Vector3d(first[0], first[1], first[2]);
+    corner.dimensions[2] = std::min(corner.dimensions[2], grid.dimensions[2] - first[2]);
+    Volume<float> some(corner.dimensions);
+    Volume<unsigned char> inSome(corner.dimensions);
+    FillFanWithNoise(p, {probe, turned}, corner, some.View(), inSome.View());
+    for (int k = 0; k < corner.dimensions[2]; ++k)
+      for (int j = 0; j < corner.dimensions[1]; ++j)
+        for (int i = 0; i < corner.dimensions[0]; ++i) {
+          EXPECT_EQ(inSome.View()(i, j, k), inside.View()(i + first[0], j + first[1], k + first[2]));
+          EXPECT_NEAR(some.View()(i, j, k), whole.View()(i + first[0], j + first[1], k + first[2]), 0.5f);
+        }
   }
 }
 

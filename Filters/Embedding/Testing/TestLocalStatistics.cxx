@@ -265,6 +265,74 @@ TEST(LocalStatistics, DoesNotDependOnThreads)
   EXPECT_TRUE(std::equal(many.deviation.View().begin(), many.deviation.View().end(), single.deviation.View().begin()));
 }
 
+// Rows that are added in any pieces, and slices of blocks of which the first were forgotten: within what the window reaches it is
+// all the same to the last bit, and as of the whole but for rounding. Sizes are no multiples of blocks.
+TEST(LocalStatistics, OfSumsThatComeAndGo)
+{
+  const std::array<int, 3> n{41, 23, 61};
+  const Eigen::Vector3d spacing(0.5, 0.6, 0.4);
+  Volume<float> volume(n);
+  Volume<unsigned char> region(n);
+  for (std::ptrdiff_t at = 0; at < volume.View().Size(); ++at) {
+    volume.View()[at] = static_cast<float>(50.0 + 10.0 * Random(3, static_cast<std::uint64_t>(at)).Normal());
+    region.View()[at] = at % 41 + at / 41 % 23 > 20;
+  }
+  const Values whole = All(LocalStatistics(std::as_const(volume).View(), region.View(), spacing, 2.0), volume);
+  const Blocks blocks(n, spacing, 2.0 / 1.5);
+  const int reach = LocalStatistics::Reach(blocks, spacing, 2.0), first = 3 + reach;
+  BlockSums all(blocks, 0), later(blocks, 2), next(blocks, 5);
+  all.Grow(blocks.count[2]);
+  later.Grow(5);
+  next.Grow(blocks.count[2]);
+  for (int k = 0; k < n[2]; ++k)
+    for (int j = 0; j < n[1]; ++j) {
+      const float* const row = std::as_const(volume).View().Row(j, k);
+      const unsigned char* const counts = std::as_const(region).View().Row(j, k);
+      all.AddRow(0, j, k, row, counts, n[0]);
+      const int K = k / blocks.size[2], split = 4 * blocks.size[0];
+      for (const auto& [from, end] : {std::pair(0, split), std::pair(split, n[0])})
+        if (K >= 2)
+          (K < 5 ? later : next).AddRow(from, j, k, row + from, counts + from, end - from);
+    }
+  later.Append(std::move(next));
+  later.Forget(first - reach);
+  EXPECT_EQ(later.First(), 3);
+  EXPECT_EQ(later.End(), blocks.count[2]);
+  const LocalStatistics complete(all, 0, blocks.count[2], spacing, 2.0),
+      part(later, first - reach, blocks.count[2], spacing, 2.0), moved = part.From({2, 1, 4});
+  std::vector<float> mean(static_cast<std::size_t>(n[0])), deviation(mean), partMean(mean), partDeviation(mean);
+  int compared = 0;
+  for (int k = 0; k < n[2]; ++k)
+    for (int j = 0; j < n[1]; ++j) {
+      complete.Row(j, k, 0, n[0], mean.data(), deviation.data());
+      for (int i = 0; i < n[0]; ++i)
+        if (region.View()(i, j, k)) {
+          EXPECT_NEAR(mean[static_cast<std::size_t>(i)], whole.mean.View()(i, j, k), 1e-4);
+          EXPECT_NEAR(deviation[static_cast<std::size_t>(i)], whole.deviation.View()(i, j, k), 1e-4);
+        }
+      if (blocks.PositionOf(k, 2) < first)
+        continue;
+      part.Row(j, k, 0, n[0], partMean.data(), partDeviation.data());
+      EXPECT_EQ(partMean, mean);
+      EXPECT_EQ(partDeviation, deviation);
+      if (j >= 1) {
+        moved.Row(j - 1, k - 4, 3, 4, partMean.data(), partDeviation.data());
+        EXPECT_EQ(partMean[0], mean[5]);
+        EXPECT_EQ(partDeviation[0], deviation[5]);
+      }
+      ++compared;
+    }
+  EXPECT_GT(compared, 200);
+  // At the middle of a block, where blocks have one.
+  const int I = 2, J = 1, K = first + 1;
+  part.RowOfBlocks(J, K, mean.data(), deviation.data());
+  ASSERT_EQ(blocks.size, (std::array<int, 3>{3, 2, 3}));
+  complete.Row(J * 2, K * 3 + 1, I * 3 + 1, I * 3 + 2, partMean.data(), partDeviation.data());
+  complete.Row(J * 2 + 1, K * 3 + 1, I * 3 + 1, I * 3 + 2, partMean.data() + 1, partDeviation.data() + 1);
+  EXPECT_NEAR(mean[I], 0.5f * (partMean[0] + partMean[1]), 0.1f);
+  EXPECT_NEAR(deviation[I], 0.5f * (partDeviation[0] + partDeviation[1]), 0.1f);
+}
+
 TEST(LocalStatistics, RefusesBadInput)
 {
   const Volume<float> volume({4, 4, 4});

@@ -82,6 +82,52 @@ TEST(ToneMapping, WhatIsWantedIsTheSameAsWithoutAsking)
   EXPECT_THROW(ExtractGrain({3.0, true}, volume.View(), {}, spacing, grain.View(), {}, other.View()), Error);
 }
 
+// Noise that is everywhere alike, in a region whose border cuts blocks: from its sums comes the grain that comes from itself.
+TEST(ToneMapping, FromSumsItIsTheSameButForAThousandth)
+{
+  const std::array<int, 3> n{72, 60, 48};
+  Volume<float> volume(n);
+  Volume<unsigned char> region(n), wanted(n);
+  for (int k = 0; k < n[2]; ++k)
+    for (int j = 0; j < n[1]; ++j)
+      for (int i = 0; i < n[0]; ++i) {
+        Random random(12, static_cast<std::uint64_t>((k * 60 + j) * 72 + i));
+        volume.View()(i, j, k) = static_cast<float>(100.0 + 25.0 * random.Normal());
+        region.View()(i, j, k) = i + j > 20 && k > 2;
+        wanted.View()(i, j, k) = i + j > 20 && k > 10 && i < 60;
+      }
+  const Eigen::Vector3d fine(0.5, 0.5, 0.5);
+  for (const bool matchDeviation : {true, false}) {
+    const ToneMappingParameters parameters{3.0, matchDeviation};
+    Volume<float> all(n), first(n), some = volume;
+    ExtractGrain(parameters, volume.View(), region.View(), fine, all.View());
+    const Blocks blocks(n, fine, 2.0);
+    BlockSums sums(blocks, 0);
+    sums.Grow(blocks.count[2]);
+    for (int k = 0; k < n[2]; ++k)
+      for (int j = 0; j < n[1]; ++j)
+        sums.AddRow(0, j, k, std::as_const(volume).View().Row(j, k), std::as_const(region).View().Row(j, k), n[0]);
+    const LocalStatistics noise(sums, 0, blocks.count[2], fine, 3.0);
+    const BlockSums left = SumsOfFirstRound(parameters, sums, noise, 0, blocks.count[2]);
+    const LocalStatistics once(left, 0, blocks.count[2], fine, 3.0);
+    ExtractGrain(parameters, noise, once, some.View(), wanted.View());
+    double worst = 0.0, squares = 0.0, count = 0.0;
+    for (std::ptrdiff_t at = 0; at < all.View().Size(); ++at) {
+      if (!wanted.View()[at]) {
+        ASSERT_EQ(some.View()[at], volume.View()[at]);
+        continue;
+      }
+      const double difference = static_cast<double>(some.View()[at]) - static_cast<double>(all.View()[at]);
+      worst = std::max(worst, std::abs(difference));
+      squares += difference * difference;
+      count += 1.0;
+    }
+    const double deviation = matchDeviation ? 1.0 : 0.25;
+    EXPECT_LT(std::sqrt(squares / count), 1e-3 * deviation) << matchDeviation;
+    EXPECT_LT(worst, 1e-2 * deviation) << matchDeviation;
+  }
+}
+
 TEST(ToneMapping, ThereAndBackIsTheLevelThatIsGiven)
 {
   EXPECT_EQ(ApplyGrain(true, 1.5f, 40.0f, 10.0f), 55.0f);
