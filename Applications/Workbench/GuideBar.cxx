@@ -4,6 +4,7 @@
 #include "Workbench.h"
 #include <algorithm>
 #include <QAction>
+#include <QEvent>
 #include <QHBoxLayout>
 #include <QLabel>
 #include <QPushButton>

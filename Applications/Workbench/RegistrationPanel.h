@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "JobPanel.h"
+#include "Message.h"
 #include <vector>
 
 class QCheckBox;

@@ -15,6 +15,7 @@
 #include <QVTKInteractor.h>
 #include <vtkCommand.h>
 #include <vtkGenericOpenGLRenderWindow.h>
+#include <vtkImageData.h>
 #include <vtkNew.h>
 #include <vtkRenderer.h>
 
