@@ -29,7 +29,7 @@ paraview_plugin_build(PLUGINS ${plugins}
 # paraview_plugin_build does not wrap the modules for Python.
 vtk_module_wrap_python(MODULES ${modules} INSTALL_EXPORT EchoramaParaViewPython PYTHON_PACKAGE echorama
   MODULE_DESTINATION ${ECHORAMA_PYTHON_PACKAGES} CMAKE_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/echorama-paraview
-  BUILD_STATIC OFF TARGET Echorama::Python)
+  INSTALL_HEADERS OFF BUILD_STATIC OFF TARGET Echorama::Python) # VTK 9.3 would install a header with the name of Python's own
 include(EchoramaPythonPackage)
 
 if(ECHORAMA_TESTING)

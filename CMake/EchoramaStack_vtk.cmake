@@ -30,7 +30,7 @@ vtk_module_build(MODULES ${modules} PACKAGE Echorama INSTALL_EXPORT Echorama
   CMAKE_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/echorama)
 vtk_module_wrap_python(MODULES ${modules} INSTALL_EXPORT EchoramaPython PYTHON_PACKAGE echorama
   MODULE_DESTINATION ${ECHORAMA_PYTHON_PACKAGES} CMAKE_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/echorama
-  BUILD_STATIC OFF TARGET Echorama::Python)
+  INSTALL_HEADERS OFF BUILD_STATIC OFF TARGET Echorama::Python) # VTK 9.3 would install a header with the name of Python's own
 include(EchoramaPythonPackage)
 
 # The kernels, for the ParaView stack (from this build tree) and for other projects (installed).
