@@ -92,7 +92,7 @@ ECHORAMA_HOT int Sieve(const BrickView& v, const float* __restrict px, const flo
   int kept = 0;
   for (int begin = 0; begin < count; begin += lanes) {
     alignas(64) float late[lanes], exponent[lanes];
-    alignas(64) int inside[lanes];
+    alignas(64) int inside[lanes]; // as wide as the numbers: with bytes the whole loop becomes one of short vectors
     unsigned char flags[lanes];
     for (int i = 0; i < lanes; ++i) {
       const float x0 = px[begin + i], y0 = py[begin + i], z0 = pz[begin + i];

@@ -15,8 +15,8 @@ constexpr RTCSceneFlags embreeQueryFilters = RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCT
 struct EmbreeQuery {
   RTCIntersectContext context;
 
-  /// \param filter is called for every hit, if it is not null
-  void Ask(RTCScene scene, RTCRayHit& ray, RTCFilterFunctionN filter = nullptr)
+  /// \param filter is called for every hit
+  void Ask(RTCScene scene, RTCRayHit& ray, RTCFilterFunctionN filter)
   {
     rtcInitIntersectContext(&context);
     context.filter = filter;
@@ -31,16 +31,14 @@ constexpr RTCSceneFlags embreeQueryFilters = RTC_SCENE_FLAG_FILTER_FUNCTION_IN_A
 struct EmbreeQuery {
   RTCRayQueryContext context;
 
-  void Ask(RTCScene scene, RTCRayHit& ray, RTCFilterFunctionN filter = nullptr)
+  void Ask(RTCScene scene, RTCRayHit& ray, RTCFilterFunctionN filter)
   {
     rtcInitRayQueryContext(&context);
     RTCIntersectArguments arguments;
     rtcInitIntersectArguments(&arguments);
     arguments.context = &context;
-    if (filter) {
-      arguments.filter = filter;
-      arguments.flags = static_cast<RTCRayQueryFlags>(arguments.flags | RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER);
-    }
+    arguments.filter = filter;
+    arguments.flags = static_cast<RTCRayQueryFlags>(arguments.flags | RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER);
     rtcIntersect1(scene, &ray, &arguments);
   }
 };

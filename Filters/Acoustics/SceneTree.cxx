@@ -42,6 +42,8 @@ struct Collector {
 };
 
 // Keeps a hit, and lets Embree look for others up to the slack behind the nearest one so far (and not only before this one).
+// Filters may make the end of the ray nearer; this one sets it between the hit and where it was before, which Embree 3 and 4
+// read back alike.
 void CollectHit(const RTCFilterFunctionNArguments* arguments)
 {
   auto& collector = *reinterpret_cast<Collector*>(arguments->context);

@@ -175,9 +175,6 @@ void Transport(const AcousticScene& scene, const Block& block, const std::string
   const SoundTracer tracer(scene, SoundTransport(), SoundConditions());
   const SceneTree tree = TreeOf(block.surface);
   const auto tolerance = static_cast<float>(scene.Tolerance());
-  const auto answer = [&tree, tolerance](const Question& question, std::vector<SceneTree::Hit>& found) {
-    return tree.FirstHits(question.line, tolerance, question.far, tolerance, found);
-  };
   std::vector<std::vector<Question>> ends(planes); // of all pieces of the ways
   std::vector<Question> primary;
   double segments = 0.0, questions = 0.0;
@@ -206,7 +203,7 @@ void Transport(const AcousticScene& scene, const Block& block, const std::string
     ParallelFor(planes, [&](std::ptrdiff_t k) {
       std::vector<SceneTree::Hit> mine;
       for (const Question& end : ends[static_cast<std::size_t>(k)])
-        answer(end, mine);
+        tree.FirstHits(end.line, tolerance, end.far, tolerance, mine);
     });
   };
   // In turn, and by the processor's time beside the clock's: machines are shared.
