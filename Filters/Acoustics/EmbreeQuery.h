@@ -15,8 +15,8 @@ constexpr RTCSceneFlags embreeQueryFilters = RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCT
 struct EmbreeQuery {
   RTCIntersectContext context;
 
-  /// \param filter is called for every hit
-  void Ask(RTCScene scene, RTCRayHit& ray, RTCFilterFunctionN filter)
+  /// \param filter is called for every hit, if there is one
+  void Ask(RTCScene scene, RTCRayHit& ray, RTCFilterFunctionN filter = nullptr)
   {
     rtcInitIntersectContext(&context);
     context.filter = filter;
@@ -31,7 +31,7 @@ constexpr RTCSceneFlags embreeQueryFilters = RTC_SCENE_FLAG_FILTER_FUNCTION_IN_A
 struct EmbreeQuery {
   RTCRayQueryContext context;
 
-  void Ask(RTCScene scene, RTCRayHit& ray, RTCFilterFunctionN filter)
+  void Ask(RTCScene scene, RTCRayHit& ray, RTCFilterFunctionN filter = nullptr)
   {
     rtcInitRayQueryContext(&context);
     RTCIntersectArguments arguments;
