@@ -3,10 +3,12 @@
 """Times of one benchmark in columns: compare_benchmarks.py NAME.COLUMN.jsonl... (./run bench NAME --cpus)
 
 Each file is what the benchmark printed (Testing/Benchmark.h), with kernels for one CPU for instance. A row is the same line of all; a
-column after the first also tells how many times as fast it is as the first.
+column after the first also tells how many times as fast it is as the first. Where there are columns "any" (kernels as packages have
+them) and "native" (tuned for this machine), a last line tells how much longer the former take.
 """
 import json
 import pathlib
+import statistics
 import sys
 
 
@@ -24,6 +26,18 @@ def table(columns):
     return rows
 
 
+def packaged(columns):
+    """How much longer kernels of packages take than those tuned for this machine."""
+    ratios = [(each["seconds"] / native["seconds"], f"{each.get('case', '')} {each.get('method', '')}".strip())
+              for each, native in zip(columns["any"], columns["native"]) if native["seconds"] > 0.0]
+    if not ratios:
+        return "nothing was timed with both kernels of packages and those tuned for this machine"
+    slow = sum(ratio > 1.1 for ratio, _ in ratios)
+    most, row = max(ratios)
+    return (f"kernels of packages take {statistics.median(ratio for ratio, _ in ratios):.2f} times as long as those tuned for this machine "
+            f"(median), at most {most:.2f} times ({row}); {slow} of {len(ratios)} rows more than 1.1 times")
+
+
 def main():
     if len(sys.argv) < 2:
         sys.exit("usage: compare_benchmarks.py NAME.COLUMN.jsonl...")
@@ -34,6 +48,8 @@ def main():
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     for row in rows:
         print("  ".join(word.ljust(width) for word, width in zip(row, widths)).rstrip())
+    if {"any", "native"} <= columns.keys():
+        print(packaged(columns))
 
 
 if __name__ == "__main__":
