@@ -281,8 +281,9 @@ void Embed(const EmbedParameters& parameters, VolumeView<const unsigned char> re
   const VolumeView<const unsigned char> shown = masks.shown.View();
   ExtractGrain(ToneOf(parameters), noise, form, spacing, noise, progress.Part(0.5, 0.75), shown);
   ApplyLevels(parameters, levels, {0, 0, 0}, shown, noise, progress.Part(0.75, 0.8));
+  const LocalStatistics background(levels.blocks, levels.mean.View());
   Feather<T>(parameters, masks.weights.View(), region, noise, form, spacing, intensity, labels, progress.Part(0.8, 1.0),
-             &statistics);
+             &statistics, &background);
 }
 
 template <class T>
