@@ -11,29 +11,30 @@
 namespace echorama {
 namespace {
 
-constexpr int WindowLanes = 64;
+constexpr int Many = 64, Some = 16;
+
+template <int Lanes>
+[[gnu::always_inline]] inline void SumColumns(const float* const* rows, const float* taps, int count, int first, float* out)
+{
+  float sum[Lanes] = {};
+  for (int t = 0; t < count; ++t) {
+    const float* const row = rows[t] + first;
+    for (int lane = 0; lane < Lanes; ++lane)
+      sum[lane] += taps[t] * row[lane];
+  }
+  std::copy_n(sum, Lanes, out + first);
+}
 
 // out[i] = sum over t of taps[t] * rows[t][i].
 ECHORAMA_HOT void SumRows(const float* const* rows, const float* taps, int count, int width, float* out)
 {
   int i = 0;
-  for (; i + WindowLanes <= width; i += WindowLanes) {
-    float sum[WindowLanes] = {};
-    for (int t = 0; t < count; ++t) {
-      const float* row = rows[t] + i;
-      const float tap = taps[t];
-      for (int lane = 0; lane < WindowLanes; ++lane)
-        sum[lane] += tap * row[lane];
-    }
-    for (int lane = 0; lane < WindowLanes; ++lane)
-      out[i + lane] = sum[lane];
-  }
-  for (; i < width; ++i) {
-    float sum = 0.0f;
-    for (int t = 0; t < count; ++t)
-      sum += taps[t] * rows[t][i];
-    out[i] = sum;
-  }
+  for (; i + Many <= width; i += Many)
+    SumColumns<Many>(rows, taps, count, i, out);
+  for (; width >= Some && i < width; i += Some) // the last partly once more
+    SumColumns<Some>(rows, taps, count, std::min(i, width - Some), out);
+  for (; i < width; ++i)
+    SumColumns<1>(rows, taps, count, i, out);
 }
 
 struct Kernel {
@@ -80,8 +81,7 @@ void AlongRow(float* row, int n, const Kernel& kernel, std::vector<float>& padde
   SumRows(rows.data(), kernel.taps.data(), static_cast<int>(rows.size()), n, row);
 }
 
-// One slice, along x and y.
-void Smooth(VolumeView<float> volume, int k, const Kernel& x, const Kernel& y)
+void SmoothAlongXAndY(VolumeView<float> volume, int k, const Kernel& x, const Kernel& y)
 {
   const auto& n = volume.Dimensions();
   std::vector<float> copy;
@@ -99,7 +99,7 @@ void GaussianSum(VolumeView<float> volume, const Eigen::Vector3d& sigmaVoxels)
   const Kernel x(sigmaVoxels.x()), y(sigmaVoxels.y()), z(sigmaVoxels.z());
   const auto& n = volume.Dimensions();
   if (!x.taps.empty() || !y.taps.empty())
-    ParallelFor(n[2], [&](std::ptrdiff_t k) { Smooth(volume, static_cast<int>(k), x, y); });
+    ParallelFor(n[2], [&](std::ptrdiff_t k) { SmoothAlongXAndY(volume, static_cast<int>(k), x, y); });
   if (!z.taps.empty())
     ParallelFor(n[1], [&](std::ptrdiff_t j) {
       std::vector<float> copy;
