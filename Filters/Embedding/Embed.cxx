@@ -6,8 +6,8 @@
 // contrast than speckle has, single bright echoes are taken out of it before its values spread (SpeckleLevel).
 //
 // Cost: two passes over the volume for the distance map and the statistics of the data, three over the noise to flatten it, one
-// where it shows to flatten it again and one to give it its new mean and contrast, two for the overlay; the diffusion depends on
-// the blocks alone.
+// where it shows to flatten it again and one to give it its new mean and contrast, one for the overlay, whose local means are
+// known by then; the diffusion depends on the blocks alone.
 #include "Embed.h"
 #include "BlockRows.h"
 #include "Core/Base/Error.h"
