@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "LatticeEquations.h"
 #include "Core/Base/Parallel.h"
-#include "Index.h"
+#include "Filters/Registration/Index.h"
 #include <Eigen/LU>
 
 namespace echorama {

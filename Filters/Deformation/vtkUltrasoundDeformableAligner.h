@@ -34,15 +34,15 @@
 #ifndef vtkUltrasoundDeformableAligner_h
 #define vtkUltrasoundDeformableAligner_h
 
-#include "EchoramaFiltersRegistrationModule.h"
+#include "EchoramaFiltersDeformationModule.h"
 #include "vtkUltrasoundMultiBlockAlgorithm.h"
 #include "vtkUltrasoundParameters.h"
 
 #ifndef __VTK_WRAP__
-#include "Filters/Registration/DeformableAlign.h"
+#include "Filters/Deformation/DeformableAlign.h"
 #endif
 
-class ECHORAMAFILTERSREGISTRATION_EXPORT vtkUltrasoundDeformableAligner : public vtkUltrasoundMultiBlockAlgorithm {
+class ECHORAMAFILTERSDEFORMATION_EXPORT vtkUltrasoundDeformableAligner : public vtkUltrasoundMultiBlockAlgorithm {
 public:
   static vtkUltrasoundDeformableAligner* New();
   vtkTypeMacro(vtkUltrasoundDeformableAligner, vtkUltrasoundMultiBlockAlgorithm);

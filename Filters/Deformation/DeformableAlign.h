@@ -2,7 +2,7 @@
 #pragma once
 #include "Core/Base/Parameters.h"
 #include "Core/Imaging/DisplacementField.h"
-#include "LocalAlign.h"
+#include "Filters/Registration/LocalAlign.h"
 
 namespace echorama {
 

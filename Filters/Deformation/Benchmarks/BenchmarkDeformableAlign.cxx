@@ -6,9 +6,9 @@
 // its penalty, longest step and iterations were tuned on pairs of pressed bodies. Its transform becomes a field of our own kind,
 // so both are measured alike.
 #include "Core/Imaging/Sampling.h"
+#include "Filters/Deformation/DeformableAlign.h"
 #include "Filters/Phantoms/Phantom.h"
 #include "Filters/Phantoms/PhantomViews.h"
-#include "Filters/Registration/DeformableAlign.h"
 #include "Testing/Benchmark.h"
 #include "Testing/ElastixPeer.h"
 #include <optional>

@@ -11,10 +11,10 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
-#include "Index.h"
+#include "Filters/Registration/Index.h"
+#include "Filters/Registration/Metric.h"
+#include "Filters/Registration/PlacedVolume.h"
 #include "LatticeEquations.h"
-#include "Metric.h"
-#include "PlacedVolume.h"
 #include <algorithm>
 #include <cmath>
 

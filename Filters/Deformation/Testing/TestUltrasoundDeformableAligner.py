@@ -8,7 +8,7 @@ from vtkmodules.vtkCommonCore import vtkCommand
 from vtkmodules.vtkCommonDataModel import vtkImageData, vtkMultiBlockDataSet
 
 from echorama.EchoramaCore import vtkUltrasoundDisplacement
-from echorama.EchoramaFiltersRegistration import vtkUltrasoundDeformableAligner
+from echorama.EchoramaFiltersDeformation import vtkUltrasoundDeformableAligner
 
 try:
     from echorama.EchoramaFiltersStitching import vtkUltrasoundStitcher

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
-#include "Filters/Registration/DeformableAlign.h"
+#include "Filters/Deformation/DeformableAlign.h"
 #include "Testing/Sanitized.h"
 #include <cmath>
 #include <functional>
