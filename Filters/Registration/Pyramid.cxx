@@ -3,6 +3,7 @@
 // fixed order, so the result does not depend on the threads. NaN marks what is not real from the first level on; a child
 // then counts when it equals itself, and the mask is not looked at again.
 #include "Filters/Registration/Pyramid.h"
+#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/VoxelTypes.h"
 #include <algorithm>
@@ -38,6 +39,31 @@ PyramidLevel Finest(const PosedVolume<T>& volume, const Progress& progress)
   return level;
 }
 
+template <int Step>
+[[gnu::always_inline]] inline void AddEvery(const float* row, int count, float* __restrict sum, float* __restrict real)
+{
+  for (int i = 0; i < count; ++i) {
+    const float value = row[Step * i];
+    sum[i] += value == value ? value : 0.0f;
+    real[i] += value == value ? 1.0f : 0.0f;
+  }
+}
+
+// Adds those of a row of children that are real to their parents: each to one, or two of them.
+ECHORAMA_HOT void AddChildren(const float* row, int step, int children, float* sum, float* real)
+{
+  if (step == 1)
+    return AddEvery<1>(row, children, sum, real);
+  AddEvery<2>(row, (children + 1) / 2, sum, real);
+  AddEvery<2>(row + 1, children / 2, sum, real);
+}
+
+ECHORAMA_HOT void Means(const float* sum, const float* real, float needed, int count, float* mean)
+{
+  for (int i = 0; i < count; ++i)
+    mean[i] = real[i] >= needed ? sum[i] / real[i] : NoValue;
+}
+
 PyramidLevel Halved(const PyramidLevel& fine, const std::array<int, 3>& factor)
 {
   PyramidLevel coarse;
@@ -49,31 +75,20 @@ PyramidLevel Halved(const PyramidLevel& fine, const std::array<int, 3>& factor)
     coarse.geometry.spacing[axis] *= factor[axis];
     coarse.geometry.origin += 0.5 * (factor[axis] - 1) * fine.geometry.spacing[axis] * fine.geometry.direction.col(axis);
   }
-  coarse.intensity = Volume<float>(coarse.geometry.dimensions, NoValue);
+  coarse.intensity = Volume<float>(coarse.geometry.dimensions);
   const VolumeView<float> out = coarse.intensity.View();
   const auto& m = out.Dimensions();
-  const int needed = (factor[0] * factor[1] * factor[2] + 1) / 2;
+  const float needed = static_cast<float>((factor[0] * factor[1] * factor[2] + 1) / 2);
   ParallelFor(m[2], [&](std::ptrdiff_t slice) {
     const int k = static_cast<int>(slice), kEnd = std::min(n[2], (k + 1) * factor[2]);
+    std::vector<float> sum(static_cast<std::size_t>(m[0])), real(sum.size());
     for (int j = 0; j < m[1]; ++j) {
-      const int jEnd = std::min(n[1], (j + 1) * factor[1]);
-      float* row = out.Row(j, k);
-      for (int i = 0; i < m[0]; ++i) {
-        const int iEnd = std::min(n[0], (i + 1) * factor[0]);
-        float sum = 0.0f;
-        int real = 0;
-        for (int c = k * factor[2]; c < kEnd; ++c)
-          for (int b = j * factor[1]; b < jEnd; ++b)
-            for (int a = i * factor[0]; a < iEnd; ++a) {
-              const float value = in(a, b, c);
-              if (value == value) {
-                sum += value;
-                ++real;
-              }
-            }
-        if (real >= needed)
-          row[i] = sum / static_cast<float>(real);
-      }
+      std::fill(sum.begin(), sum.end(), 0.0f);
+      std::fill(real.begin(), real.end(), 0.0f);
+      for (int c = k * factor[2]; c < kEnd; ++c)
+        for (int b = j * factor[1]; b < std::min(n[1], (j + 1) * factor[1]); ++b)
+          AddChildren(in.Row(b, c), factor[0], n[0], sum.data(), real.data());
+      Means(sum.data(), real.data(), needed, m[0], out.Row(j, k));
     }
   });
   coarse.realVoxels = CountReal(coarse.intensity);

@@ -2,9 +2,12 @@
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include "Filters/Registration/Pyramid.h"
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <gtest/gtest.h>
 #include <limits>
+#include <utility>
 
 namespace echorama {
 namespace {
@@ -125,6 +128,43 @@ TEST(Pyramid, TreatsMissingChildrenAtOddEndsAsNotReal)
   EXPECT_EQ(coarse.Dimensions(), (std::array<int, 3>{2, 2, 1}));
   EXPECT_EQ(coarse.View()(1, 0, 0), -5.0f);        // four of eight
   EXPECT_TRUE(std::isnan(coarse.View()(1, 1, 0))); // two of eight
+}
+
+// Rows of several lengths with holes, and axes that are halved or not: each voxel beside the mean of its children.
+TEST(Pyramid, EveryVoxelIsTheMeanOfItsRealChildren)
+{
+  Random random(6);
+  for (const int length : {2, 7, 37, 70, 131})
+    for (const double spacing : {1.0, 2.0}) { // of the rows: those of 2 are not halved
+      const std::array<int, 3> n{length, 5, 4};
+      Volume<float> volume(n);
+      for (float& v : volume.View())
+        v = random.Uniform() < 0.4 ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(random.Normal());
+      PyramidParameters p = Deep();
+      p.levels = 2;
+      const auto levels = BuildPyramid<float>({volume.View(), {}, Oblique(n, {spacing, 1.0, 1.0})}, p);
+      ASSERT_EQ(levels.size(), 2u);
+      const VolumeView<const float> coarse = levels[1].intensity.View();
+      const int halved = spacing < 1.4 ? 2 : 1;
+      ASSERT_EQ(coarse.Dimensions(), (std::array<int, 3>{(length + halved - 1) / halved, 3, 2}));
+      for (int k = 0; k < 2; ++k)
+        for (int j = 0; j < 3; ++j)
+          for (int i = 0; i < coarse.Dimensions()[0]; ++i) {
+            double sum = 0.0;
+            int real = 0;
+            for (int c = 2 * k; c < 2 * k + 2; ++c)
+              for (int b = 2 * j; b < std::min(5, 2 * j + 2); ++b)
+                for (int a = halved * i; a < std::min(length, halved * i + halved); ++a)
+                  if (const float value = std::as_const(volume).View()(a, b, c); !std::isnan(value)) {
+                    sum += static_cast<double>(value);
+                    ++real;
+                  }
+            if (real >= 2 * halved)
+              ASSERT_NEAR(coarse(i, j, k), sum / real, 1e-6) << length << ": " << i << " " << j << " " << k;
+            else
+              ASSERT_TRUE(std::isnan(coarse(i, j, k))) << length << ": " << i << " " << j << " " << k;
+          }
+    }
 }
 
 TEST(Pyramid, LeavesAFlatAxisAloneAndStopsWhereTold)
