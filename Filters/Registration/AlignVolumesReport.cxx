@@ -6,26 +6,50 @@
 #include <cmath>
 
 namespace echorama {
+namespace {
+
+// Pairs or volumes that a reason names, at most five: of thousands of volumes there may be many.
+class FewOfMany {
+public:
+  explicit FewOfMany(const char* separator) : separator_(separator) {}
+
+  void Add(const std::string& name)
+  {
+    if (++count_ <= 5)
+      names_ += (names_.empty() ? "" : separator_) + name;
+  }
+  int Count() const { return count_; }
+  std::string Text() const { return count_ <= 5 ? names_ : names_ + Format(" and %d more", count_ - 5); }
+
+private:
+  std::string separator_, names_;
+  int count_ = 0;
+};
+
+} // namespace
+
 std::string AlignVolumesRun::WhyDoubtful(int v) const
 {
-  std::string contested, unsure;
+  FewOfMany contested("; "), unsure("; ");
   double residual = 0.0;
-  int count = 0;
-  for (std::size_t e = 0; e < edges_.size(); ++e) {
-    const Attempt& attempt = attempts_.at(edges_[e]);
-    if (graph_.isContested[e]) {
-      contested += (contested.empty() ? "" : "; ") + NameOfPair(edges_[e]);
-      residual = std::max(residual, graph_.residualMm[e]);
-      ++count;
+  for (const bool isItsOwn : {true, false}) // are named first
+    for (std::size_t e = 0; e < edges_.size(); ++e) {
+      if ((edges_[e].first == v || edges_[e].second == v) != isItsOwn)
+        continue;
+      const Attempt& attempt = attempts_.at(edges_[e]);
+      if (graph_.isContested[e]) {
+        contested.Add(NameOfPair(edges_[e]));
+        residual = std::max(residual, graph_.residualMm[e]);
+      }
+      if (isItsOwn && !graph_.isWrong[e] && graph_.isBridge[e] && !attempt.edge.verified)
+        unsure.Add(NameOfPair(edges_[e]) + " (" + attempt.pair.alignment.reason + ")");
     }
-    if (!graph_.isWrong[e] && graph_.isBridge[e] && !attempt.edge.verified && (edges_[e].first == v || edges_[e].second == v))
-      unsure += (unsure.empty() ? "" : "; ") + NameOfPair(edges_[e]) + " (" + attempt.pair.alignment.reason + ")";
-  }
-  if (!unsure.empty())
-    return "its pose depends on an ambiguous pair alone: " + unsure;
-  if (count > 0)
-    return std::string(count == 1 ? "the pair " : "the pairs ") + contested + (count == 1 ? " disagrees" : " disagree") +
-           " with the others by " + Format("%.1f mm", residual) + ", and as many pairs support it as contradict it";
+  if (unsure.Count() > 0)
+    return "its pose depends on an ambiguous pair alone: " + unsure.Text();
+  if (contested.Count() > 0)
+    return (contested.Count() == 1 ? "the pair " : "the pairs ") + contested.Text() +
+           (contested.Count() == 1 ? " disagrees" : " disagree") + " with the others by " + Format("%.1f mm", residual) +
+           ", and as many pairs support it as contradict it";
   return "volumes between it and " + volumes_[Index(fixed_)].name + " are placed by ambiguous pairs only";
 }
 
@@ -33,20 +57,20 @@ std::string AlignVolumesRun::WhyFailed(int v) const
 {
   if (!troubles_[Index(v)].empty())
     return troubles_[Index(v)];
-  std::string reasons, others;
+  FewOfMany reasons("; "), others(", ");
   for (const auto& [numbers, attempt] : attempts_) {
     if (numbers.first != v && numbers.second != v)
       continue;
     if (attempt.pair.alignment.verdict == Verdict::Failed)
-      reasons += (reasons.empty() ? "" : "; ") + NameOfPair(numbers) + ": " + attempt.pair.alignment.reason;
+      reasons.Add(NameOfPair(numbers) + ": " + attempt.pair.alignment.reason);
     else
-      others += (others.empty() ? "" : ", ") + volumes_[Index(numbers.first == v ? numbers.second : numbers.first)].name;
+      others.Add(volumes_[Index(numbers.first == v ? numbers.second : numbers.first)].name);
   }
-  if (!others.empty())
-    return "it is aligned with " + others + " only, which no pair joins to " + volumes_[Index(fixed_)].name;
-  if (reasons.empty())
+  if (others.Count() > 0)
+    return "it is aligned with " + others.Text() + " only, which no pair joins to " + volumes_[Index(fixed_)].name;
+  if (reasons.Count() == 0)
     return "it overlaps no other volume at its start pose or within the allowed distance from it";
-  return "no pair places it: " + reasons;
+  return "no pair places it: " + reasons.Text();
 }
 
 AlignVolumesResult AlignVolumesRun::Report() const

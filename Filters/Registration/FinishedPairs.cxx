@@ -3,6 +3,7 @@
 #include "Core/Base/Checksum.h"
 #include "Core/Base/JsonPlace.h"
 #include "Core/Base/TextFile.h"
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -12,7 +13,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* Schema = "echorama-finished-pairs-1"; // of the file; what pairs depend on is in their keys
-constexpr double SecondsBetweenWrites = 5.0;
+// A large file is written less often: that takes a twentieth of the time, unless minutes of work could be lost.
+constexpr double SecondsBetweenWrites = 5.0, WritingShare = 0.05, MostSecondsBetweenWrites = 300.0;
 constexpr std::size_t LargestFile = std::size_t{1} << 30;
 constexpr int Verdicts = 3;
 
@@ -144,7 +146,7 @@ void FinishedPairs::Add(const std::string& key, const PairAlignment& found)
     return;
   pairs_[key] = found;
   isChanged_ = true;
-  if (SecondsSince(written_) >= SecondsBetweenWrites)
+  if (SecondsSince(written_) >= std::clamp(secondsToWrite_ / WritingShare, SecondsBetweenWrites, MostSecondsBetweenWrites))
     Write();
 }
 
@@ -152,6 +154,7 @@ void FinishedPairs::Write()
 {
   if (!isChanged_)
     return;
+  const Clock::time_point start = Clock::now();
   Json pairs = Json::array();
   for (const auto& [key, found] : pairs_)
     pairs.push_back(ToJson(key, found));
@@ -165,6 +168,7 @@ void FinishedPairs::Write()
   WriteTextFile(path_, text + "\n]}\n");
   isChanged_ = false;
   written_ = Clock::now();
+  secondsToWrite_ = SecondsSince(start);
 }
 
 void Pack(Packed& to, const PairAlignment& pair)

@@ -10,8 +10,8 @@ namespace echorama {
 
 /// Pairs that were aligned before, in a file, so that a run that was stopped goes on where it was.
 ///
-/// A pair is known again by its key: all that its answer depends on. The file is replaced as a whole, every few seconds and at
-/// the end; what a crash leaves is the file as it was then.
+/// A pair is known again by its key: all that its answer depends on. The file is replaced as a whole, every few seconds (a
+/// large one less often, at least every five minutes) and at the end; what a crash leaves is the file as it was then.
 class FinishedPairs {
 public:
   /// Reads \a path if it is there. Empty: no file, and nothing is remembered.
@@ -40,6 +40,7 @@ private:
   std::map<std::string, PairAlignment> pairs_;
   bool isChanged_ = false;
   Clock::time_point written_ = Clock::now();
+  double secondsToWrite_ = 0.0; // the last time
 };
 
 /// A pair as another rank is told of it, to the last bit.

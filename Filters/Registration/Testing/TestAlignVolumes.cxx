@@ -371,7 +371,24 @@ TEST(AlignVolumes, ATriangleKnowsOnlyThatSomethingIsWrong)
   for (const std::size_t v : {1u, 2u}) {
     EXPECT_EQ(result.volumes[v].verdict, Verdict::Ambiguous);
     EXPECT_NE(result.volumes[v].reason.find("as many pairs"), std::string::npos) << result.volumes[v].reason;
+    EXPECT_EQ(result.volumes[v].reason.find("more"), std::string::npos) << result.volumes[v].reason;
   }
+}
+
+// Nine pairs fail: five are named.
+TEST(AlignVolumes, AReasonNamesFewOfManyPairs)
+{
+  Ring ring;
+  for (int v = 0; v < 10; ++v)
+    ring.verdicts[std::minmax(v, 5)] = Verdict::Failed;
+  AlignVolumesParameters p;
+  p.pair.start = AlignStart::Unknown;
+  const AlignVolumesResult result = AlignVolumes(ring.Volumes(), 0, p, {}, ring.Aligner());
+  EXPECT_EQ(result.volumes[5].verdict, Verdict::Failed);
+  const std::string& reason = result.volumes[5].reason;
+  EXPECT_EQ(reason.substr(0, 18), "no pair places it:") << reason;
+  EXPECT_EQ(std::count(reason.begin(), reason.end(), ';'), 4) << reason;
+  EXPECT_EQ(reason.substr(reason.size() - 11), " and 4 more") << reason;
 }
 
 TEST(AlignVolumes, ThoseHeldStayAndTheOthersComeToThem)
