@@ -158,6 +158,13 @@ def identity(program):
     return told.hexdigest()
 
 
+def commit_of_code():
+    """As git describe says it; the pages, which this fills, do not make it dirty."""
+    commit = subprocess.run(["git", "describe", "--always"], cwd=source, stdout=subprocess.PIPE, text=True).stdout.strip()
+    code = ["git", "diff", "--quiet", "HEAD", "--", ".", ":(exclude)Documentation", ":(exclude)*.md"]
+    return commit + ("-dirty" if subprocess.run(code, cwd=source).returncode == 1 else "")
+
+
 def measured(program, wait, again):
     """What it prints, and when, where and how that was measured."""
     kept = program.with_suffix(".measured.json")
@@ -169,7 +176,7 @@ def measured(program, wait, again):
             print(f"{program.name}: measured before, the program has not changed", file=sys.stderr)
             return told
     quiet = wait_until_quiet(wait)
-    commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=source, stdout=subprocess.PIPE, text=True).stdout.strip()
+    commit = commit_of_code()
     print(f"{program.name}{'' if quiet else ': the machine is not quiet'}", file=sys.stderr)
     begin = time.monotonic()
     done = subprocess.run([program], cwd=source, stdout=subprocess.PIPE, text=True)

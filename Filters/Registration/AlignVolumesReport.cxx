@@ -8,20 +8,21 @@
 namespace echorama {
 namespace {
 
-// Pairs or volumes that a reason names, at most five: of thousands of volumes there may be many.
+// Pairs or volumes that a reason names, and how many more there are: of thousands of volumes there may be many.
 class FewOfMany {
 public:
   explicit FewOfMany(const char* separator) : separator_(separator) {}
 
   void Add(const std::string& name)
   {
-    if (++count_ <= 5)
+    if (++count_ <= Named)
       names_ += (names_.empty() ? "" : separator_) + name;
   }
   int Count() const { return count_; }
-  std::string Text() const { return count_ <= 5 ? names_ : names_ + Format(" and %d more", count_ - 5); }
+  std::string Text() const { return count_ <= Named ? names_ : names_ + Format(" and %d more", count_ - Named); }
 
 private:
+  static constexpr int Named = 5;
   std::string separator_, names_;
   int count_ = 0;
 };
@@ -36,12 +37,13 @@ std::string AlignVolumesRun::WhyDoubtful(int v) const
     for (std::size_t e = 0; e < edges_.size(); ++e) {
       if ((edges_[e].first == v || edges_[e].second == v) != isItsOwn)
         continue;
-      const Attempt& attempt = attempts_.at(edges_[e]);
       if (graph_.isContested[e]) {
         contested.Add(NameOfPair(edges_[e]));
         residual = std::max(residual, graph_.residualMm[e]);
       }
-      if (isItsOwn && !graph_.isWrong[e] && graph_.isBridge[e] && !attempt.edge.verified)
+      if (!isItsOwn || graph_.isWrong[e] || !graph_.isBridge[e])
+        continue;
+      if (const Attempt& attempt = attempts_.at(edges_[e]); !attempt.edge.verified)
         unsure.Add(NameOfPair(edges_[e]) + " (" + attempt.pair.alignment.reason + ")");
     }
   if (unsure.Count() > 0)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Each level is one pass over the one before it, slice by slice: a coarse voxel gathers its one to eight children in a
-// fixed order, so the result does not depend on the threads. NaN marks what is not real from the first level on; a child
+// Each level is one pass over the one before it, slice by slice: rows of children are added to their parents in a fixed
+// order, so the result does not depend on the threads. NaN marks what is not real from the first level on; a child
 // then counts when it equals itself, and the mask is not looked at again.
 #include "Filters/Registration/Pyramid.h"
 #include "Core/Base/Multiversion.h"

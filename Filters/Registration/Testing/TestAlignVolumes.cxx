@@ -391,6 +391,45 @@ TEST(AlignVolumes, AReasonNamesFewOfManyPairs)
   EXPECT_EQ(reason.substr(reason.size() - 11), " and 4 more") << reason;
 }
 
+// Seven triangles that meet in the first volume, in each of which something is wrong: five pairs are named, those of a volume
+// first.
+TEST(AlignVolumes, AReasonNamesAVolumesOwnPairsFirst)
+{
+  Ring ring(30);
+  const std::vector<Numbers> triangles{{1, 2}, {8, 9}, {10, 20}, {11, 21}, {12, 22}, {18, 28}, {19, 29}}; // beside volume 0
+  for (int a = 0; a < 30; ++a)
+    for (int b = a + 1; b < 30; ++b)
+      ring.verdicts[{a, b}] = Verdict::Failed;
+  std::uint64_t item = 0;
+  for (const auto& [a, b] : triangles) {
+    for (const Numbers& pair : {Numbers(0, a), Numbers(0, b), Numbers(a, b)})
+      ring.verdicts[pair] = Verdict::Aligned;
+    ring.Lie(a, b, ++item);
+  }
+  AlignVolumesParameters p;
+  p.pair.start = AlignStart::Unknown;
+  p.rounds = 1;
+  const AlignVolumesResult result = AlignVolumes(ring.Volumes(), 0, p, {}, ring.Aligner());
+  int contested = 0;
+  for (const PairOfVolumes& pair : result.pairs) {
+    if (!pair.contested)
+      continue;
+    ++contested;
+    const std::string first =
+        "the pairs volume " + std::to_string(pair.fixed) + " and volume " + std::to_string(pair.moving) + "; ";
+    for (const int v : {pair.fixed, pair.moving}) {
+      if (v == 0)
+        continue;
+      const std::string& reason = result.volumes[Index(v)].reason;
+      EXPECT_EQ(result.volumes[Index(v)].verdict, Verdict::Ambiguous);
+      EXPECT_EQ(reason.substr(0, first.size()), first) << reason;
+      EXPECT_EQ(std::count(reason.begin(), reason.end(), ';'), 4) << reason;
+      EXPECT_NE(reason.find(" and 2 more disagree with the others"), std::string::npos) << reason;
+    }
+  }
+  EXPECT_EQ(contested, 7);
+}
+
 TEST(AlignVolumes, ThoseHeldStayAndTheOthersComeToThem)
 {
   Ring ring;
