@@ -1,6 +1,7 @@
 # echorama_add_room(NAME
 #   [KERNEL_DEPENDS room...]      rooms whose kernels ours call
 #   [KERNEL_LIBRARIES target...]  further libraries, private to the kernels
+#   [KERNEL_DEFINITIONS name...] [KERNEL_OPTIONS option...] for compiling the kernels
 #   [KERNEL_SUBDIRECTORIES dir...] where the kernels lie, default: the room's own folder
 #   [CLASSES class...]            vtk classes, by path without extension
 #   [UNWRAPPED class...]          the same, for C++ alone
@@ -14,7 +15,7 @@
 # Benchmarks/Benchmark*.cxx, Fuzzing/Fuzz*.cxx (libFuzzer). Other sources in Benchmarks are contestants: methods that are no part of the
 # product, for its benchmarks and tests.
 function(echorama_add_room name)
-  cmake_parse_arguments(PARSE_ARGV 1 room "" "" "KERNEL_DEPENDS;KERNEL_LIBRARIES;KERNEL_SUBDIRECTORIES;CLASSES;UNWRAPPED;VTK_LIBRARIES;FUZZED;BENCHMARK_DEPENDS")
+  cmake_parse_arguments(PARSE_ARGV 1 room "" "" "KERNEL_DEPENDS;KERNEL_LIBRARIES;KERNEL_DEFINITIONS;KERNEL_OPTIONS;KERNEL_SUBDIRECTORIES;CLASSES;UNWRAPPED;VTK_LIBRARIES;FUZZED;BENCHMARK_DEPENDS")
   if(NOT ECHORAMA_STACK STREQUAL "paraview")
     _echorama_add_kernels(${name})
   endif()
@@ -28,6 +29,29 @@ function(echorama_add_room name)
     _echorama_add_fuzzers(${name})
   endif()
 endfunction()
+
+# The library of a room's kernels, or a second one of the same name for CPUs of a level of x86-64.
+macro(_echorama_add_kernel_library target level)
+  add_dependencies(kernels ${target})
+  add_library(${target} SHARED ${kernels})
+  set_target_properties(${target} PROPERTIES OUTPUT_NAME Echorama${name}Kernels VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}
+    # Kernels have no export macros: their whole interface is public.
+    CXX_VISIBILITY_PRESET default VISIBILITY_INLINES_HIDDEN OFF
+    # Templates of Eigen are instantiated once for several files. So no two kernels of a room may use one name for two things.
+    UNITY_BUILD ${ECHORAMA_UNITY} UNITY_BUILD_BATCH_SIZE 6)
+  target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/echorama>)
+  target_compile_features(${target} PUBLIC cxx_std_17)
+  # Eigen's alignment, and whether it allocates with malloc alone, would follow each compiler call's instruction set; the interface
+  # must not: what one side allocates the other frees.
+  target_compile_definitions(${target} PUBLIC ${ECHORAMA_EIGEN_INTERFACE} PRIVATE ${room_KERNEL_DEFINITIONS})
+  target_compile_options(${target} PRIVATE ${room_KERNEL_OPTIONS})
+  target_link_libraries(${target} PUBLIC Eigen3::Eigen PRIVATE ${room_KERNEL_LIBRARIES})
+  foreach(other IN LISTS room_KERNEL_DEPENDS)
+    target_link_libraries(${target} PUBLIC Echorama::${other}Kernels)
+  endforeach()
+  echorama_compile_options(${target} ${level})
+  echorama_precompile(${target} kernels ${level})
+endmacro()
 
 macro(_echorama_add_kernels name)
   if(NOT room_KERNEL_SUBDIRECTORIES)
@@ -45,26 +69,18 @@ macro(_echorama_add_kernels name)
   list(FILTER headers EXCLUDE REGEX "/vtk[^/]*$")
 
   set(target ${name}Kernels)
-  add_dependencies(kernels ${target})
-  add_library(${target} SHARED ${kernels})
+  _echorama_add_kernel_library(${target} "")
   add_library(Echorama::${target} ALIAS ${target})
-  set_target_properties(${target} PROPERTIES OUTPUT_NAME Echorama${target} VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}
-    # Kernels have no export macros: their whole interface is public.
-    CXX_VISIBILITY_PRESET default VISIBILITY_INLINES_HIDDEN OFF
-    # Templates of Eigen are instantiated once for several files. So no two kernels of a room may use one name for two things.
-    UNITY_BUILD ${ECHORAMA_UNITY} UNITY_BUILD_BATCH_SIZE 6)
-  target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/echorama>)
-  target_compile_features(${target} PUBLIC cxx_std_17)
-  # Eigen's alignment, and whether it allocates with malloc alone, would follow each compiler call's instruction set; the interface
-  # must not: what one side allocates the other frees.
-  target_compile_definitions(${target} PUBLIC ${ECHORAMA_EIGEN_INTERFACE})
-  target_link_libraries(${target} PUBLIC Eigen3::Eigen PRIVATE ${room_KERNEL_LIBRARIES})
-  foreach(other IN LISTS room_KERNEL_DEPENDS)
-    target_link_libraries(${target} PUBLIC Echorama::${other}Kernels)
-  endforeach()
-  echorama_compile_options(${target})
-  echorama_precompile(${target} kernels)
   install(TARGETS ${target} EXPORT EchoramaKernels LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} NAMELINK_COMPONENT development)
+  foreach(level IN LISTS ECHORAMA_CPU_LEVELS)
+    # The dynamic loader prefers a library in glibc-hwcaps/LEVEL to the one beside that folder.
+    set(folder glibc-hwcaps/${level})
+    _echorama_add_kernel_library(${target}_${level} ${level})
+    set_target_properties(${target}_${level} PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${CMAKE_LIBRARY_OUTPUT_DIRECTORY}/${folder}
+      INSTALL_RPATH "$ORIGIN/../..")
+    add_dependencies(${target} ${target}_${level}) # what is loaded is never older than what was built
+    install(TARGETS ${target}_${level} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/${folder} NAMELINK_SKIP)
+  endforeach()
   foreach(header IN LISTS headers)
     file(RELATIVE_PATH place ${PROJECT_SOURCE_DIR} ${header})
     get_filename_component(place ${place} DIRECTORY)

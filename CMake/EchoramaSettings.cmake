@@ -23,18 +23,21 @@ if(ECHORAMA_CCACHE)
       CCACHE_SLOPPINESS=pch_defines,time_macros,include_file_mtime,include_file_ctime ${ECHORAMA_CCACHE})
 endif()
 
-# echorama_compile_options(TARGET): instruction set, and warnings for our own (never for generated) code.
+# echorama_compile_options(TARGET [CPU]): instruction set (default: ECHORAMA_CPU), and warnings for our own (never for generated) code.
 function(echorama_compile_options target)
   # Contraction would give other numbers where fused multiply-add exists: off, so that all builds agree.
   target_compile_options(${target} PRIVATE -ffp-contract=off)
   # Nobody reads errno or floating-point traps; without these two, loops with a square root or a comparison are not
   # vectorised. Neither changes a result.
   target_compile_options(${target} PRIVATE -fno-math-errno -fno-trapping-math)
-  if(NOT ECHORAMA_CPU STREQUAL "any")
-    target_compile_options(${target} PRIVATE -march=${ECHORAMA_CPU})
-  elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  set(cpu ${ARGN})
+  if(NOT cpu)
+    set(cpu ${ECHORAMA_CPU})
+  endif()
+  if(NOT cpu STREQUAL "any")
+    target_compile_options(${target} PRIVATE -march=${cpu})
+  elseif(ECHORAMA_IS_X86)
     target_compile_options(${target} PRIVATE -march=x86-64-v2)
-    target_compile_definitions(${target} PRIVATE ECHORAMA_MULTIVERSION)
   endif()
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wnon-virtual-dtor -Woverloaded-virtual
     # & between truths is meant where a branch would keep a loop from being vectorised.
@@ -48,10 +51,10 @@ function(echorama_compile_options target)
     $<$<BOOL:${ECHORAMA_STRICT}>:-Werror>)
 endfunction()
 
-# echorama_precompile(TARGET KIND): the headers that most files of its kind include are parsed once. KIND is
+# echorama_precompile(TARGET KIND [CPU]): the headers that most files of its kind include are parsed once. KIND is
 #   kernels, classes   shared libraries: the numerical ones, those of vtk classes
 #   tests              GoogleTest programs
-# Each kind has one precompiled header, made by the first target that asks for it. A file still includes what it uses.
+# Each kind and CPU has one precompiled header, made by the first target that asks for it. A file still includes what it uses.
 set(ECHORAMA_HEADERS_kernels <algorithm> <array> <cmath> <cstdint> <cstring> <filesystem> <fstream> <functional> <limits> <map>
   <memory> <mutex> <numeric> <optional> <set> <sstream> <string> <string_view> <tuple> <utility> <vector>
   <Eigen/Core> <Eigen/Geometry> <Eigen/Cholesky> <Eigen/Eigenvalues> <Eigen/SVD>)
@@ -60,7 +63,8 @@ set(ECHORAMA_HEADERS_classes ${ECHORAMA_HEADERS_kernels} <vtkDataObjectTree.h> <
   <vtkStreamingDemandDrivenPipeline.h> <vtkUnsignedCharArray.h>)
 set(ECHORAMA_HEADERS_tests ${ECHORAMA_HEADERS_kernels} <gtest/gtest.h>)
 function(echorama_precompile target kind)
-  set(maker Echorama_headers_of_${kind})
+  list(JOIN ARGN _ cpu)
+  set(maker Echorama_headers_of_${kind}${cpu})
   if(NOT TARGET ${maker})
     file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/${maker}.cxx CONTENT "// holds a precompiled header\n")
     if(kind STREQUAL "tests")
@@ -70,7 +74,7 @@ function(echorama_precompile target kind)
     else()
       add_library(${maker} OBJECT EXCLUDE_FROM_ALL ${CMAKE_BINARY_DIR}/${maker}.cxx)
     endif()
-    echorama_compile_options(${maker})
+    echorama_compile_options(${maker} ${ARGN})
     target_compile_definitions(${maker} PRIVATE ${ECHORAMA_EIGEN_INTERFACE})
     target_link_libraries(${maker} PRIVATE Eigen3::Eigen)
     if(kind STREQUAL "classes")

@@ -3,8 +3,8 @@
 """Times of one benchmark in columns: compare_benchmarks.py NAME.COLUMN.jsonl... (./run bench NAME --cpus)
 
 Each file is what the benchmark printed (Testing/Benchmark.h), with kernels for one CPU for instance. A row is the same line of all; a
-column after the first also tells how many times as fast it is as the first. Where there are columns "any" (kernels as packages have
-them) and "native" (tuned for this machine), a last line tells how much longer the former take.
+column after the first also tells how many times as fast it is as the first. Where the last column is "native" (kernels tuned for this
+machine), a last line tells how much longer those of packages take: the column before it, the highest level that this machine runs.
 """
 import json
 import pathlib
@@ -27,9 +27,9 @@ def table(columns):
 
 
 def packaged(columns):
-    """How much longer kernels of packages take than those tuned for this machine."""
+    """How much longer kernels of packages, the last column but one, take than those tuned for this machine, the last."""
     ratios = [(each["seconds"] / native["seconds"], f"{each.get('case', '')} {each.get('method', '')}".strip())
-              for each, native in zip(columns["any"], columns["native"]) if native["seconds"] > 0.0]
+              for each, native in zip(columns[-2], columns[-1]) if native["seconds"] > 0.0]
     if not ratios:
         return "nothing was timed with both kernels of packages and those tuned for this machine"
     slow = sum(ratio > 1.1 for ratio, _ in ratios)
@@ -48,8 +48,8 @@ def main():
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     for row in rows:
         print("  ".join(word.ljust(width) for word, width in zip(row, widths)).rstrip())
-    if {"any", "native"} <= columns.keys():
-        print(packaged(columns))
+    if len(columns) > 1 and [*columns][-1] == "native":
+        print(packaged([*columns.values()]))
 
 
 if __name__ == "__main__":

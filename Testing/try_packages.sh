@@ -48,6 +48,19 @@ pipeline() {
   echorama info demo/stitched.vdb | grep OpenVDB
   echorama info demo/embedded.mha | grep -i voxels
 }
+cpu_levels() { # the loader takes the kernels of the highest level that the machine runs; all give the same voxels
+  local loader=/lib64/ld-linux-x86-64.so.2 program level folder
+  program=$(command -v echorama)
+  for level in x86-64-v2 x86-64-v3 x86-64-v4; do
+    "$loader" --help | grep "$level (supported" || continue
+    folder=glibc-hwcaps/$level
+    [ "$level" != x86-64-v2 ] || folder=x86_64-linux-gnu
+    "$loader" --glibc-hwcaps-mask "$level" --list "$program" | grep "/$folder/libEchoramaCoreKernels"
+    "$loader" --glibc-hwcaps-mask "$level" "$program" stitch demo/volume_*.mha --poses demo/poses.json -o level.mha
+    cmp level.mha demo/stitched.mha
+  done
+  ldd "$program" | grep "/$folder/libEchoramaCoreKernels"
+}
 python_package() {
   cat >python.py <<'END'
 import echorama
@@ -126,6 +139,7 @@ try "install" apt "$debs"/*.deb
 try "licences" licences
 try "as they were packed" dpkg --verify echorama echorama-libraries echorama-python echorama-dev
 try "phantom, align, stitch, embed, convert, info" pipeline
+try "kernels for each level of CPUs" cpu_levels
 try "Python package" python_package
 try "workbench, simulator, leds" versions
 try "manual pages" manual

@@ -5,7 +5,6 @@
 // depend on the offset alone, and those of three dimensions are products of those along the axes.
 #include "DisplacementField.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include <algorithm>
 #include <cmath>
@@ -56,9 +55,8 @@ inline std::array<double, 4> ValueWeights(double t)
 
 // The weighted sum of 4 x 4 x 4 coefficients of four numbers each: row by row, and rows in sums of their own, since one sum
 // of all would wait for each addition.
-ECHORAMA_HOT Eigen::Vector3d SumOf64(const double* first, std::ptrdiff_t row, std::ptrdiff_t slice,
-                                     const std::array<double, 4>& wx, const std::array<double, 4>& wy,
-                                     const std::array<double, 4>& wz)
+Eigen::Vector3d SumOf64(const double* first, std::ptrdiff_t row, std::ptrdiff_t slice, const std::array<double, 4>& wx,
+                        const std::array<double, 4>& wy, const std::array<double, 4>& wz)
 {
   using Quad = double __attribute__((vector_size(32), aligned(8), may_alias));
   Quad sum = {};

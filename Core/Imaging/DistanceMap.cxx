@@ -12,7 +12,6 @@
 // Precision: equal spacings are worked in voxels, whose squared distances are integers that floats hold exactly below 2^24.
 // With different spacings a value is rounded five times at most: once for each of the three terms, once for each sum.
 #include "DistanceMap.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include <algorithm>
 #include <cmath>
@@ -94,7 +93,7 @@ struct alignas(64) Block {
 // The search in one row. Beyond both ends of g lie 2 Lanes of infinity, and the arrays near, above and below, one number for
 // eight voxels, have two elements beyond both ends. squares[d] is the squared length of d steps.
 // Returns false when the search has become too long; the result is then not complete.
-ECHORAMA_HOT bool SearchRow(int n, const float* g, float* near, float* above, float* below, const float* squares, float* result)
+bool SearchRow(int n, const float* g, float* near, float* above, float* below, const float* squares, float* result)
 {
   static_assert(Stride == 8 && Lanes == 16, "a vector, moved by eight steps, meets the voxels of three eights");
   const int eights = (n + 7) / 8;
@@ -153,7 +152,7 @@ ECHORAMA_HOT bool SearchRow(int n, const float* g, float* near, float* above, fl
 // The search in a tile: voxel i of sixteen lines is at g + Lanes * i; beyond both ends lie Stride voxels of infinity. Every
 // line has its own limits above and below, one for Stride voxels.
 // Returns false when the search has become too long; the result is then not complete.
-ECHORAMA_HOT bool SearchTile(int n, const float* g, float* above, float* below, const float* squares, float* result)
+bool SearchTile(int n, const float* g, float* above, float* below, const float* squares, float* result)
 {
   // The smallest of every Stride voxels, and running minima of these from both ends.
   const std::ptrdiff_t groups = (n + Stride - 1) / Stride;
@@ -341,14 +340,14 @@ private:
 };
 
 // The sweep along +y: steps since the mask, kept in steps from row to row.
-ECHORAMA_HOT void CountSteps(const unsigned char* mask, int n, float* steps, float* out)
+void CountSteps(const unsigned char* mask, int n, float* steps, float* out)
 {
   for (int i = 0; i < n; ++i)
     out[i] = steps[i] = mask[i] != 0 ? 0.0f : steps[i] + 1.0f;
 }
 
 // The sweep along -y over what the first one left: the squared distance along y.
-ECHORAMA_HOT void SweepBack(const float* out, int n, double squaredSpacing, float* steps, float* g)
+void SweepBack(const float* out, int n, double squaredSpacing, float* steps, float* g)
 {
   for (int i = 0; i < n; ++i) {
     const float back = steps[i] + 1.0f, nearest = out[i] < back ? out[i] : back;

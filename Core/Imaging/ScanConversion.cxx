@@ -13,7 +13,6 @@
 // from the cache. No sum is formed and no operation is contracted, so every build gives the same numbers.
 #include "Core/Imaging/ScanConversion.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/VoxelTypes.h"
 #include <algorithm>
@@ -97,9 +96,9 @@ inline __attribute__((always_inline)) bool Within(float index, float last)
 }
 
 // Pass 1 for a row along the array, in the plane of the sweep that it lies in, at a distance rho from the face there.
-ECHORAMA_HOT void PlanAlongArray(const FloatArc fan, const FloatDepth range, const float x0, const float dx, const float rho,
-                                 const int samples, const int begin, const int end, int* __restrict offset,
-                                 int* __restrict inside, float* __restrict depthFraction, float* __restrict fanFraction)
+void PlanAlongArray(const FloatArc fan, const FloatDepth range, const float x0, const float dx, const float rho,
+                    const int samples, const int begin, const int end, int* __restrict offset, int* __restrict inside,
+                    float* __restrict depthFraction, float* __restrict fanFraction)
 {
   const float b = fan.unit + fan.curvature * rho, bb = b * b, alongMiddle = (fan.unit + b) * rho;
   for (int i = begin; i < end; ++i) {
@@ -119,10 +118,10 @@ ECHORAMA_HOT void PlanAlongArray(const FloatArc fan, const FloatDepth range, con
 }
 
 // Pass 1 for any other row, whose voxels lie at start + step * i in the probe frame: both bends per voxel.
-ECHORAMA_HOT void PlanOblique(const FloatArc fan, const FloatArc sweep, const FloatDepth range, const Eigen::Vector3f& start,
-                              const Eigen::Vector3f& step, const int samples, const int planeSamples, const int begin,
-                              const int end, int* __restrict offset, int* __restrict inside, float* __restrict depthFraction,
-                              float* __restrict fanFraction, float* __restrict sweepFraction)
+void PlanOblique(const FloatArc fan, const FloatArc sweep, const FloatDepth range, const Eigen::Vector3f& start,
+                 const Eigen::Vector3f& step, const int samples, const int planeSamples, const int begin, const int end,
+                 int* __restrict offset, int* __restrict inside, float* __restrict depthFraction, float* __restrict fanFraction,
+                 float* __restrict sweepFraction)
 {
   const float x0 = start[0], y0 = start[1], z0 = start[2], dx = step[0], dy = step[1], dz = step[2];
   for (int i = begin; i < end; ++i) {
@@ -199,11 +198,10 @@ inline __attribute__((always_inline)) T VoxelOf(Real<T> value, int& inside)
 
 // Pass 3.
 template <class T>
-inline __attribute__((always_inline)) void BlendRow(const Pair<T>* __restrict here, const Pair<T>* __restrict beam,
-                                                    const Pair<T>* __restrict plane, const Pair<T>* __restrict both,
-                                                    const float* __restrict depth, const float* __restrict fan,
-                                                    const float* __restrict sweep, const int* __restrict insideRow, int count,
-                                                    T* __restrict intensity, unsigned char* __restrict valid)
+void Blend(const Pair<T>* __restrict here, const Pair<T>* __restrict beam, const Pair<T>* __restrict plane,
+           const Pair<T>* __restrict both, const float* __restrict depth, const float* __restrict fan,
+           const float* __restrict sweep, const int* __restrict insideRow, int count, T* __restrict intensity,
+           unsigned char* __restrict valid)
 {
   using R = Real<T>;
   for (int i = 0; i < count; ++i) {
@@ -215,17 +213,6 @@ inline __attribute__((always_inline)) void BlendRow(const Pair<T>* __restrict he
     valid[i] = static_cast<unsigned char>(inside);
   }
 }
-
-// One function per type, because templates do not come in several versions.
-#define EchoramaBlend(T)                                                                                                         \
-  ECHORAMA_HOT void Blend(const Pair<T>* here, const Pair<T>* beam, const Pair<T>* plane, const Pair<T>* both,                   \
-                          const float* depth, const float* fan, const float* sweep, const int* inside, int count, T* intensity,  \
-                          unsigned char* valid)                                                                                  \
-  {                                                                                                                              \
-    BlendRow<T>(here, beam, plane, both, depth, fan, sweep, inside, count, intensity, valid);                                    \
-  }
-ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaBlend)
-#undef EchoramaBlend
 
 // The box around all samples, in the probe frame. Between these angles each coordinate is monotonic, and it is linear in
 // depth, so its extremes are among these points.

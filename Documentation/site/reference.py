@@ -22,7 +22,7 @@ MACROS = [f"vtkUltrasound{kind}Macro(name)={type} name" for kind, type in PARAME
     "vtkSetFilePathMacro(name)=void Set##name(const char* path);", "vtkGetFilePathMacro(name)=char* Get##name();",
     "vtkSetVector3Macro(name,type)=void Set##name(type x, type y, type z);", "vtkGetVector3Macro(name,type)=type* Get##name();",
     "vtkSetVectorMacro(name,type,count)=void Set##name(const type value[count]);", "vtkGetVectorMacro(name,type,count)=type* Get##name();",
-    "VTK_SIZEHINT(n)=", "VTK_NEWINSTANCE=", "VTK_DEPRECATED=", "ECHORAMA_HOT="]
+    "VTK_SIZEHINT(n)=", "VTK_NEWINSTANCE=", "VTK_DEPRECATED="]
 INLINE = {"bold": "strong", "emphasis": "em", "computeroutput": "code", "superscript": "sup", "subscript": "sub", "itemizedlist": "ul",
           "orderedlist": "ol", "listitem": "li", "row": "tr", "blockquote": "blockquote"}
 SECTIONS = {"see": "See also", "return": "Returns", "note": "Note", "warning": "Warning", "pre": "Before", "post": "After"}

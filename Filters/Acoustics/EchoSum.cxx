@@ -17,7 +17,6 @@
 #include "EchoSum.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/NumberText.h"
 #include "VectorMath.h"
 #include <algorithm>
@@ -85,8 +84,8 @@ inline std::size_t BitsOf(const unsigned char* bytes)
 }
 
 // Depth and exponent of those scatterers that are in the tube, in their order. \returns how many.
-ECHORAMA_HOT int Sieve(const BrickView& v, const float* __restrict px, const float* __restrict py, const float* __restrict pz,
-                       const float* __restrict amplitudes, int count, Sieved& out)
+int Sieve(const BrickView& v, const float* __restrict px, const float* __restrict py, const float* __restrict pz,
+          const float* __restrict amplitudes, int count, Sieved& out)
 {
   const BrickView w = v;
   int kept = 0;
@@ -133,7 +132,7 @@ ECHORAMA_HOT int Sieve(const BrickView& v, const float* __restrict px, const flo
 }
 
 // Adds echoes to the fine row.
-ECHORAMA_HOT void AddEchoes(const BrickView& v, const Sieved& in, int count, float* __restrict fineRow)
+void AddEchoes(const BrickView& v, const Sieved& in, int count, float* __restrict fineRow)
 {
   const float startTurn = v.turn, turnsPerMm = v.turnsPerMm, startFine = v.fine, finePerMm = v.finePerMm;
   const int base = v.fineBase;
@@ -171,7 +170,7 @@ ECHORAMA_HOT void AddEchoes(const BrickView& v, const Sieved& in, int count, flo
 }
 
 // row += weight * samples
-ECHORAMA_HOT void AddWeighted(float weight, const float* samples, std::ptrdiff_t count, float* row)
+void AddWeighted(float weight, const float* samples, std::ptrdiff_t count, float* row)
 {
   for (std::ptrdiff_t i = 0; i < count; ++i)
     row[i] += weight * samples[i];

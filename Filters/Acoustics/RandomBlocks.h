@@ -6,7 +6,7 @@
 namespace echorama {
 
 /// Random::Block() of many counters with one key, in place: word n of counter i is words[n][i]. The loops are plain, so that
-/// compilers make vectors of them; inline, so that they get the instructions of the loop that they stand in (Multiversion.h).
+/// compilers make vectors of them; inline, so that they become part of the loop that they stand in.
 template <int count>
 inline void RandomBlocks(std::uint32_t (&words)[4][count], std::array<std::uint32_t, 2> key)
 {

@@ -4,7 +4,6 @@
 // logarithm per grey value, and some 10 ns per sample with noise.
 #include "Receiver.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
 #include "RandomBlocks.h"
@@ -28,8 +27,8 @@ struct Window {
 constexpr int noiseBatch = 64;
 
 // The envelope of samples with noise of power noise^2, which is that of a row's samples from \a first on.
-ECHORAMA_HOT void DetectWithNoise(const std::complex<float>* samples, std::uint64_t seed, std::uint64_t row, std::uint32_t first,
-                                  int count, float noise, float* envelope)
+void DetectWithNoise(const std::complex<float>* samples, std::uint64_t seed, std::uint64_t row, std::uint32_t first, int count,
+                     float noise, float* envelope)
 {
   std::uint32_t bits[4][noiseBatch];
   for (int i = 0; i < noiseBatch; ++i) { // Random(seed, row): a block of four words for every sample

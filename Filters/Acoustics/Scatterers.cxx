@@ -16,7 +16,6 @@
 #include "Scatterers.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Memory.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
@@ -176,7 +175,7 @@ struct CellHash {
 constexpr int hashedAtOnce = 64;
 
 // Bits of cells: words begin as the cells' indices.
-ECHORAMA_HOT void HashCells(std::uint32_t (&words)[4][hashedAtOnce], std::uint32_t seedLow, std::uint32_t seedHigh)
+void HashCells(std::uint32_t (&words)[4][hashedAtOnce], std::uint32_t seedLow, std::uint32_t seedHigh)
 {
   for (int i = 0; i < hashedAtOnce; ++i)
     words[3][i] = 0x5ca7u;

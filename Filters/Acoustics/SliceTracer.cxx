@@ -13,7 +13,6 @@
 #include "SliceTracer.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Interface.h"
 #include <algorithm>
@@ -47,8 +46,8 @@ struct PictureLine {
 };
 
 // 10^(db / 10) of levels, two to the power of their whole and of their broken part: less than 1e-5 of it off.
-ECHORAMA_HOT void AddPowers(const float* __restrict level, const float* __restrict share, int count, float* __restrict power,
-                            float* __restrict scattered)
+void AddPowers(const float* __restrict level, const float* __restrict share, int count, float* __restrict power,
+               float* __restrict scattered)
 {
   for (int i = 0; i < count; ++i) {
     float x = level[i] * 0.33219281f; // log2(10) / 10

@@ -3,7 +3,6 @@
 // additions per node, neighbour and beam: some hundredths of what the rays cost that are shared.
 #include "WideBeams.h"
 #include "Core/Base/Angles.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Interface.h"
 #include <algorithm>
@@ -46,7 +45,7 @@ double WeightOf(const RayStart& start, const RayStart& axis, const Transducer& t
   return std::exp(-0.5 * (lateral * lateral + elevation * elevation));
 }
 
-ECHORAMA_HOT void AddProducts(const float* __restrict weight, const float* __restrict value, int count, float* __restrict sum)
+void AddProducts(const float* __restrict weight, const float* __restrict value, int count, float* __restrict sum)
 {
   for (int i = 0; i < count; ++i)
     sum[i] += weight[i] * value[i];

@@ -9,7 +9,6 @@
 // penalty is added to it, and conjugate gradients solve it (LatticeEquations).
 #include "DeformableAlign.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Filters/Registration/Index.h"
 #include "Filters/Registration/Metric.h"
@@ -46,7 +45,7 @@ const MetricLevel& LevelOf(const MetricPyramid& pyramid, int octave)
 }
 
 // Reads value and weight between voxels; the weight is 0 outside.
-ECHORAMA_HOT void ReadRow(const SeenVoxel* seen, const int* n, const double* positions, int count, float* out)
+void ReadRow(const SeenVoxel* seen, const int* n, const double* positions, int count, float* out)
 {
   const std::ptrdiff_t sy = n[0], sz = sy * n[1];
   for (int i = 0; i < count; ++i, positions += 3, out += 2) {

@@ -12,7 +12,6 @@
 #include "BeamNoise.h"
 #include "Core/Base/CheckRange.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
@@ -80,8 +79,8 @@ inline __attribute__((always_inline)) float SineOfTurn(float x)
 }
 
 // The words of the samples from 2 * first on: radius and turn of each.
-ECHORAMA_HOT void Words(std::uint64_t seed, std::uint64_t item, std::uint64_t first, int blocks, std::int32_t* __restrict radius,
-                        std::int32_t* __restrict turn)
+void Words(std::uint64_t seed, std::uint64_t item, std::uint64_t first, int blocks, std::int32_t* __restrict radius,
+           std::int32_t* __restrict turn)
 {
   const std::array<std::uint32_t, 2> key{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)};
   const auto low = static_cast<std::uint32_t>(item), high = static_cast<std::uint32_t>(item >> 32);
@@ -95,8 +94,8 @@ ECHORAMA_HOT void Words(std::uint64_t seed, std::uint64_t item, std::uint64_t fi
 }
 
 // Box-Muller: two independent standard normals from each pair of words.
-ECHORAMA_HOT void Normals(const std::int32_t* __restrict radius, const std::int32_t* __restrict turn, int count,
-                          float* __restrict real, float* __restrict imaginary)
+void Normals(const std::int32_t* __restrict radius, const std::int32_t* __restrict turn, int count, float* __restrict real,
+             float* __restrict imaginary)
 {
   for (int i = 0; i < count; ++i) {
     const float uniform = (static_cast<float>(radius[i]) + 0.5f) * 4.6566129e-10f; // (0, 1]
@@ -127,7 +126,7 @@ using Lane = float __attribute__((vector_size(32)));
 }
 
 // out = sum of weights[t] * rows[t], the weights being symmetric: 32 numbers at a time, whose sums stay in registers.
-ECHORAMA_HOT void WeightedSum(const float* const* rows, const float* weights, int taps, int count, float* __restrict out)
+void WeightedSum(const float* const* rows, const float* weights, int taps, int count, float* __restrict out)
 {
   constexpr int piece = 32;
   const int middle = taps / 2;
@@ -163,8 +162,8 @@ ECHORAMA_HOT void WeightedSum(const float* const* rows, const float* weights, in
 }
 
 // The intensities of a row of complex samples.
-ECHORAMA_HOT void Develop(const float* __restrict real, const float* __restrict imaginary, int count,
-                          const float* __restrict table, float nodesPerUnit, int last, float* __restrict out)
+void Develop(const float* __restrict real, const float* __restrict imaginary, int count, const float* __restrict table,
+             float nodesPerUnit, int last, float* __restrict out)
 {
   for (int i = 0; i < count; ++i) {
     const float at = std::sqrt(real[i] * real[i] + imaginary[i] * imaginary[i]) * nodesPerUnit;

@@ -3,7 +3,6 @@
 // A row of voxels lies between four rows of blocks, whose weighted sum is one row of values; that is read along x. Of blocks as
 // thin as a voxel fewer rows take part, and nothing is left to read along x.
 #include "BlockRows.h"
-#include "Core/Base/Multiversion.h"
 #include <cmath>
 
 namespace echorama {
@@ -11,14 +10,14 @@ namespace echorama {
 namespace {
 
 // Of the form v0 + t (v1 - v0), so that a constant stays that constant.
-ECHORAMA_HOT void MixRows(const double* a, const double* b, double t, int count, double* __restrict out)
+void MixRows(const double* a, const double* b, double t, int count, double* __restrict out)
 {
   for (int i = 0; i < count; ++i)
     out[i] = a[i] + t * (b[i] - a[i]);
 }
 
-ECHORAMA_HOT void MixFourRows(const double* a, const double* b, const double* d, const double* e, double ty, double tz, int count,
-                              double* __restrict out)
+void MixFourRows(const double* a, const double* b, const double* d, const double* e, double ty, double tz, int count,
+                 double* __restrict out)
 {
   for (int i = 0; i < count; ++i) {
     const double near = a[i] + ty * (b[i] - a[i]), far = d[i] + ty * (e[i] - d[i]);
@@ -26,7 +25,7 @@ ECHORAMA_HOT void MixFourRows(const double* a, const double* b, const double* d,
   }
 }
 
-ECHORAMA_HOT void ReadAlong(const double* line, const int* below, const double* after, int count, double* __restrict out)
+void ReadAlong(const double* line, const int* below, const double* after, int count, double* __restrict out)
 {
   for (int i = 0; i < count; ++i) {
     const double* v = line + below[i];

@@ -3,7 +3,6 @@
 // Sixteen neighbours at a time, whose sums stay in registers. Each number is summed from the middle outwards, so that it does not
 // depend on how many are worked out side by side.
 #include "BlockWindow.h"
-#include "Core/Base/Multiversion.h"
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -51,7 +50,7 @@ using Quad = double __attribute__((vector_size(32)));
   std::memcpy(out + 12, &s3, sizeof s3);
 }
 
-ECHORAMA_HOT void SumPieces(const double* half, int reach, const double* middle, std::ptrdiff_t step, int count, double* out)
+void SumPieces(const double* half, int reach, const double* middle, std::ptrdiff_t step, int count, double* out)
 {
   if (count >= Piece) {
     for (int next = 0; next < count; next += Piece) {

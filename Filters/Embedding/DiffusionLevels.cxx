@@ -11,7 +11,6 @@
 // From the voxels up, each level says which nodes of the next it will read. Nothing else is summed there, so a mask of wanted
 // voxels saves its share of the time.
 #include "DiffusionLevels.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include <algorithm>
 #include <cmath>
@@ -117,14 +116,14 @@ void MarkCoarse(const DiffusionLevel& fine, DiffusionLevel& coarse, const Progre
 }
 
 // The line half-way between the middle two of six.
-ECHORAMA_HOT void CombineLines(const float* const* lines, std::ptrdiff_t count, float* to)
+void CombineLines(const float* const* lines, std::ptrdiff_t count, float* to)
 {
   const float *a = lines[0], *b = lines[1], *c = lines[2], *d = lines[3], *e = lines[4], *f = lines[5];
   for (std::ptrdiff_t i = 0; i < count; ++i)
     to[i] = Taps[0] * (c[i] + d[i]) + (Taps[1] * (b[i] + e[i]) + Taps[2] * (a[i] + f[i]));
 }
 
-ECHORAMA_HOT void ExpandLine(const float* from, int pairs, float* to)
+void ExpandLine(const float* from, int pairs, float* to)
 {
   for (int i = 0; i < pairs; ++i) {
     const float* const at = from + i + Border;
@@ -133,8 +132,7 @@ ECHORAMA_HOT void ExpandLine(const float* from, int pairs, float* to)
   }
 }
 
-ECHORAMA_HOT void PutCoarse(const float* from, const unsigned char* nodes, float offset, float least, float most, int count,
-                            float* to)
+void PutCoarse(const float* from, const unsigned char* nodes, float offset, float least, float most, int count, float* to)
 {
   for (int i = 0; i < count; ++i) {
     const float value = std::min(std::max(from[i] + offset, least), most);

@@ -9,7 +9,6 @@
 //   |y - e|^-d = r^-d (1 + d u.e + d (d + 2) / 2 (u.e)^2 - d / 2 |e|^2 / r^2 + O((|e| / r)^3)).
 // Its factors are folded into the moments. The rows have the same expansion, so errors cancel where the values agree.
 #include "DiffusionSums.h"
-#include "Core/Base/Multiversion.h"
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -140,8 +139,8 @@ template <int Whole>
   }
 }
 
-ECHORAMA_HOT void Near(const DiffusionExponent& exponent, const DiffusionNear& near, int rows, std::size_t begin, std::size_t end,
-                       DiffusionBlock& block)
+void Near(const DiffusionExponent& exponent, const DiffusionNear& near, int rows, std::size_t begin, std::size_t end,
+          DiffusionBlock& block)
 {
   switch (exponent.whole) {
   case 1:
@@ -163,7 +162,7 @@ ECHORAMA_HOT void Near(const DiffusionExponent& exponent, const DiffusionNear& n
   }
 }
 
-ECHORAMA_HOT void Far(const DiffusionExponent& exponent, const DiffusionFar& far, int rows, DiffusionBlock& block)
+void Far(const DiffusionExponent& exponent, const DiffusionFar& far, int rows, DiffusionBlock& block)
 {
   switch (exponent.whole) {
   case 1:

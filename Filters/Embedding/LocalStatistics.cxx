@@ -9,7 +9,6 @@
 #include "LocalStatistics.h"
 #include "BlockWindow.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/ZeroedMemory.h"
 #include "Core/Imaging/VoxelTypes.h"
@@ -144,8 +143,7 @@ struct PaddedRow {
   std::vector<double> numbers;
 };
 
-ECHORAMA_HOT void Means(const double* __restrict weight, const double* __restrict first, int count, double whole,
-                        float* __restrict mean)
+void Means(const double* __restrict weight, const double* __restrict first, int count, double whole, float* __restrict mean)
 {
   for (int i = 0; i < count; ++i) {
     const double scale = weight[i] > 0.0 ? 1.0 / weight[i] : 0.0;
@@ -153,8 +151,8 @@ ECHORAMA_HOT void Means(const double* __restrict weight, const double* __restric
   }
 }
 
-ECHORAMA_HOT void Deviations(const double* __restrict weight, const double* __restrict first, const double* __restrict second,
-                             int count, double whole, double variance, bool fromTrend, float* __restrict deviation)
+void Deviations(const double* __restrict weight, const double* __restrict first, const double* __restrict second, int count,
+                double whole, double variance, bool fromTrend, float* __restrict deviation)
 {
   const double taken = fromTrend ? 0.0 : 1.0;
   for (int i = 0; i < count; ++i) {

@@ -5,7 +5,6 @@
 // are worked in voxels.
 #include "NearDistance.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/DistanceMap.h"
 #include <algorithm>
@@ -20,14 +19,13 @@ namespace {
 constexpr int farthest = 12; // steps; where the radius is more a search is faster
 constexpr float beyondReach = std::numeric_limits<float>::infinity();
 
-ECHORAMA_HOT void CountUp(const unsigned char* __restrict mask, int count, float* __restrict steps)
+void CountUp(const unsigned char* __restrict mask, int count, float* __restrict steps)
 {
   for (int i = 0; i < count; ++i)
     steps[i] = mask[i] != 0 ? 0.0f : steps[i] + 1.0f;
 }
 
-ECHORAMA_HOT void CountDown(const float* __restrict forth, int count, double square, float* __restrict steps,
-                            float* __restrict out)
+void CountDown(const float* __restrict forth, int count, double square, float* __restrict steps, float* __restrict out)
 {
   for (int i = 0; i < count; ++i) {
     const float back = steps[i] + 1.0f, nearest = forth[i] < back ? forth[i] : back;
@@ -37,8 +35,7 @@ ECHORAMA_HOT void CountDown(const float* __restrict forth, int count, double squ
 }
 
 // The least of what lies up to \a reach rows of \a step numbers before and after, each with the square of its distance.
-ECHORAMA_HOT void TakeNearest(const float* middle, std::ptrdiff_t step, const float* squares, int reach, int count,
-                              float* __restrict out)
+void TakeNearest(const float* middle, std::ptrdiff_t step, const float* squares, int reach, int count, float* __restrict out)
 {
   for (int i = 0; i < count; ++i)
     out[i] = middle[i];

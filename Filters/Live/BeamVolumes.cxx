@@ -14,7 +14,6 @@
 // how far a place is from where each ends is then looked up only where there are two).
 #include "Filters/Live/BeamVolumes.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/Sampling.h"
 #include "Core/Imaging/VoxelTypes.h"
@@ -65,9 +64,9 @@ struct GridCounts {
   int bricks[2]; // along x and y
 };
 
-ECHORAMA_HOT void Locate(const IndexLine line, const GridCounts grid, int first, int count, const float* __restrict distance,
-                         const float* __restrict bendX, const float* __restrict bendY, const float* __restrict bendZ,
-                         RunPlaces* __restrict places)
+void Locate(const IndexLine line, const GridCounts grid, int first, int count, const float* __restrict distance,
+            const float* __restrict bendX, const float* __restrict bendY, const float* __restrict bendZ,
+            RunPlaces* __restrict places)
 {
   const float lastX = static_cast<float>(grid.n[0] - 1), lastY = static_cast<float>(grid.n[1] - 1),
               lastZ = static_cast<float>(grid.n[2] - 1);
@@ -104,8 +103,7 @@ struct RunCorners {
 };
 
 template <class T>
-inline __attribute__((always_inline)) void BlendRun(const RunCorners<T>* __restrict corners, const RunPlaces* __restrict places,
-                                                    int count, float* __restrict value)
+void BlendCorners(const RunCorners<T>* __restrict corners, const RunPlaces* __restrict places, int count, float* __restrict value)
 {
   const auto mix = [](float a, float b, float t) __attribute__((always_inline))
   {
@@ -120,23 +118,14 @@ inline __attribute__((always_inline)) void BlendRun(const RunCorners<T>* __restr
   }
 }
 
-// One function per type, because templates do not come in several versions.
-#define EchoramaBlend(T)                                                                                                         \
-  ECHORAMA_HOT void BlendCorners(const RunCorners<T>* corners, const RunPlaces* places, int count, float* value)                 \
-  {                                                                                                                              \
-    BlendRun<T>(corners, places, count, value);                                                                                  \
-  }
-ECHORAMA_FOR_EACH_VOXEL_TYPE(EchoramaBlend)
-#undef EchoramaBlend
-
 // The sums over planes.
 struct RunSums {
   float value[runLength], weight[runLength];
   int content[runLength];
 };
 
-ECHORAMA_HOT void Accumulate(const float* __restrict value, const unsigned char* __restrict content, float weight, int count,
-                             RunSums* __restrict sums)
+void Accumulate(const float* __restrict value, const unsigned char* __restrict content, float weight, int count,
+                RunSums* __restrict sums)
 {
   for (int i = 0; i < count; ++i) {
     const float w = content[i] ? weight : 0.0f;
@@ -146,7 +135,7 @@ ECHORAMA_HOT void Accumulate(const float* __restrict value, const unsigned char*
   }
 }
 
-ECHORAMA_HOT void Finish(const RunSums* __restrict sums, int count, float* __restrict value, unsigned char* __restrict content)
+void Finish(const RunSums* __restrict sums, int count, float* __restrict value, unsigned char* __restrict content)
 {
   for (int i = 0; i < count; ++i) {
     const bool real = sums->weight[i] >= 0.4999f; // half, and what rounding may take

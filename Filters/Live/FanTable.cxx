@@ -5,7 +5,6 @@
 #include "Core/Base/Angles.h"
 #include "Core/Base/CheckRange.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/ScanConversion.h"
 #include "Filters/Live/BeamVolumes.h"
@@ -21,9 +20,8 @@ constexpr double margin = 2.0; // pixels on each side that stay free
 constexpr float fractions = 65535.0f;
 constexpr int rowsPerRange = 16;
 
-ECHORAMA_HOT void BlendPixels(const float* __restrict here, const float* __restrict next, const std::uint16_t* __restrict depth,
-                              const std::uint16_t* __restrict fan, const int* __restrict inside, int count,
-                              unsigned char* __restrict out)
+void BlendPixels(const float* __restrict here, const float* __restrict next, const std::uint16_t* __restrict depth,
+                 const std::uint16_t* __restrict fan, const int* __restrict inside, int count, unsigned char* __restrict out)
 {
   for (int i = 0; i < count; ++i) {
     const float d = static_cast<float>(depth[i]) * (1.0f / fractions), f = static_cast<float>(fan[i]) * (1.0f / fractions);

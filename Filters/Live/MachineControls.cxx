@@ -3,7 +3,6 @@
 // both, and up to 3 dB that a table of their difference gives.
 #include "Filters/Live/MachineControls.h"
 #include "Core/Base/CheckRange.h"
-#include "Core/Base/Multiversion.h"
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -29,14 +28,13 @@ const std::vector<float>& PowerSumTable()
   return table;
 }
 
-ECHORAMA_HOT void ToDb(float* __restrict value, int count, float black, float dbPerGrey, float rangeDb)
+void ToDb(float* __restrict value, int count, float black, float dbPerGrey, float rangeDb)
 {
   for (int i = 0; i < count; ++i)
     value[i] = (value[i] - black) * dbPerGrey - rangeDb;
 }
 
-ECHORAMA_HOT void AddNoise(float* __restrict db, const float* __restrict noise, int count, float mean,
-                           const float* __restrict table)
+void AddNoise(float* __restrict db, const float* __restrict noise, int count, float mean, const float* __restrict table)
 {
   for (int i = 0; i < count; ++i) {
     const float n = noise[i] + mean, larger = db[i] > n ? db[i] : n, apart = std::fabs(db[i] - n);
@@ -45,8 +43,8 @@ ECHORAMA_HOT void AddNoise(float* __restrict db, const float* __restrict noise, 
   }
 }
 
-ECHORAMA_HOT void ToGrey(float* __restrict db, const float* __restrict gain, const unsigned char* __restrict content, int count,
-                         float greyPerDb)
+void ToGrey(float* __restrict db, const float* __restrict gain, const unsigned char* __restrict content, int count,
+            float greyPerDb)
 {
   for (int i = 0; i < count; ++i) {
     float grey = 255.0f + (db[i] + gain[i]) * greyPerDb;

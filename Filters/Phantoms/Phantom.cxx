@@ -18,7 +18,6 @@
 #include "Phantom.h"
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/ParameterJson.h"
 #include "Core/Base/Random.h"
@@ -224,8 +223,8 @@ private:
 };
 
 // Adds the echoes of all scatterers of a slab of planes to \a rows: [plane][beam][depth with margins][re, im].
-ECHORAMA_HOT void AddEchoes(const std::vector<ScattererPart>& parts, std::size_t slab, const BeamGrid& grid,
-                            const GaussTable& gauss, float* rows)
+void AddEchoes(const std::vector<ScattererPart>& parts, std::size_t slab, const BeamGrid& grid, const GaussTable& gauss,
+               float* rows)
 {
   const std::ptrdiff_t rowLength = 2 * (grid.size[0] + 2 * margin);
   const int slabBegin = static_cast<int>(slab) * planesPerSlab;

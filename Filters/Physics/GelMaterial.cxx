@@ -9,7 +9,6 @@
 //
 // Pressure: kappa (J^2 - 1) / 2.
 #include "GelMaterial.h"
-#include "Core/Base/Multiversion.h"
 #include "IndependentLoop.h"
 #include <algorithm>
 #include <cmath>
@@ -50,7 +49,7 @@ constexpr long long toIntegerBits = 0x4338000000000000;
 
 // From the stress T_trial of each lane to T / T_trial, which is 1 up to the yield stress. Flow at the rate r takes away
 // stiffness * r.
-ECHORAMA_HOT void FindGelFlow(const GelLaw& law, const double* trial, const double* stiffnesses, double* scale)
+void FindGelFlow(const GelLaw& law, const double* trial, const double* stiffnesses, double* scale)
 {
   const GelOct stress = *reinterpret_cast<const GelOct*>(trial), stiffness = *reinterpret_cast<const GelOct*>(stiffnesses);
   const GelOctBits flows = stress > law.yield;
@@ -77,7 +76,7 @@ ECHORAMA_HOT void FindGelFlow(const GelLaw& law, const double* trial, const doub
   *reinterpret_cast<GelOct*>(scale) = flows ? (law.yield + x) / stress : GelOct{} + 1.0;
 }
 
-ECHORAMA_HOT int MoveGelStrain(double shear, double seconds, int count, GelStrainLanes& lanes, double* stress, double* stiffness)
+int MoveGelStrain(double shear, double seconds, int count, GelStrainLanes& lanes, double* stress, double* stiffness)
 {
   double torn[GelLanes];
   ECHORAMA_INDEPENDENT
@@ -130,7 +129,7 @@ ECHORAMA_HOT int MoveGelStrain(double shear, double seconds, int count, GelStrai
 }
 
 // Deviators scaled, and the trace that gives the determinant 1: the largest root of t^3 - |dev|^2 t / 2 + det(dev) - 1.
-ECHORAMA_HOT void RelaxGelStrain(const double* scale, GelStrainLanes& lanes)
+void RelaxGelStrain(const double* scale, GelStrainLanes& lanes)
 {
   ECHORAMA_INDEPENDENT
   for (int l = 0; l < GelLanes; ++l) {

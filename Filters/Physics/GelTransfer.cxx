@@ -6,7 +6,6 @@
 // A particle hands a node at the offset d the momentum w (m v + A d) with A = m C - dt V (4 / h^2) stress: along a row of nodes
 // one addition per node.
 #include "GelTransfer.h"
-#include "Core/Base/Multiversion.h"
 #include <algorithm>
 #include <array>
 
@@ -40,8 +39,8 @@ struct GelSpline {
   spline.toLowest = -f * cell;
 }
 
-ECHORAMA_HOT void ScatterGelParticles(const GelLaw& law, const GelTransferFrame& frame, const GelParticle* particles,
-                                      const std::int32_t* order, int count, GelNode* tile)
+void ScatterGelParticles(const GelLaw& law, const GelTransferFrame& frame, const GelParticle* particles,
+                         const std::int32_t* order, int count, GelNode* tile)
 {
   const double cell = frame.cellMm, perCell = 1.0 / cell;
   for (int n = 0; n < count; ++n) {
@@ -115,8 +114,8 @@ ECHORAMA_HOT void ScatterGelParticles(const GelLaw& law, const GelTransferFrame&
 }
 
 // Velocity and gradient of up to GelLanes particles.
-ECHORAMA_HOT void GatherGelParticles(const GelTransferFrame& frame, GelParticle* particles, const std::int32_t* order, int count,
-                                     const GelNode* tile, GelStrainLanes& lanes, double* fill)
+void GatherGelParticles(const GelTransferFrame& frame, GelParticle* particles, const std::int32_t* order, int count,
+                        const GelNode* tile, GelStrainLanes& lanes, double* fill)
 {
   const double cell = frame.cellMm, perCell = 1.0 / cell, spread = 4.0 * perCell * perCell;
   for (int n = 0; n < count; ++n) {

@@ -6,7 +6,6 @@
 // neighbours, and in the stencil the same holds for the columns, so that each coarse entry is a sum of at most seven fine ones.
 // Axis z comes first: it halves what is left to do with loops along x.
 #include "LatticeMatrix.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "IndependentLoop.h"
 #include <algorithm>
@@ -65,14 +64,14 @@ template <class Entry>
   }
 }
 
-ECHORAMA_HOT void MultiplyFloatRow(const ProductRow<float>& row, float* product)
+void MultiplyFloatRow(const ProductRow<float>& row, float* product)
 {
   std::fill(product, product + 3 * row.padded, 0.0f);
   AddBlocks(row.after - 9 * row.padded, 3 * row.padded, row.padded, row.x, 0, row.padded, product);
   AddNeighbours(row, product);
 }
 
-ECHORAMA_HOT void MultiplyPackedRow(const ProductRow<std::int16_t>& row, const float* const* own, float* product)
+void MultiplyPackedRow(const ProductRow<std::int16_t>& row, const float* const* own, float* product)
 {
   const int padded = row.padded;
   std::fill(product, product + 3 * padded, 0.0f);
@@ -99,7 +98,7 @@ constexpr Share shares[] = {{-1, -1, -1, 0.5f}, {-1, 0, -1, 0.25f}, {0, -1, -1, 
                             {1, 0, 1, 0.25f},   {1, 1, 1, 0.5f},    {0, 1, 1, 0.5f}};
 
 // sum[i] += weight * fine[i], or, along x, of every second one.
-ECHORAMA_HOT void AddRun(float* sum, const float* fine, float weight, int begin, int end)
+void AddRun(float* sum, const float* fine, float weight, int begin, int end)
 {
   ECHORAMA_INDEPENDENT
   for (int i = begin; i < end; ++i)
@@ -107,7 +106,7 @@ ECHORAMA_HOT void AddRun(float* sum, const float* fine, float weight, int begin,
 }
 
 // to = from, scaled at both ends.
-ECHORAMA_HOT void PackRun(const float* from, const float* unscale, const float* other, std::int16_t* to, int count)
+void PackRun(const float* from, const float* unscale, const float* other, std::int16_t* to, int count)
 {
   ECHORAMA_INDEPENDENT
   for (int i = 0; i < count; ++i) {
@@ -117,8 +116,8 @@ ECHORAMA_HOT void PackRun(const float* from, const float* unscale, const float* 
 }
 
 // What rounding took from the forces on the nodes, when all of them move as one.
-ECHORAMA_HOT void LostRun(const float* from, const std::int16_t* packed, const float* unscale, const float* other,
-                          const float* otherScale, float part, float* lost, int begin, int end)
+void LostRun(const float* from, const std::int16_t* packed, const float* unscale, const float* other, const float* otherScale,
+             float part, float* lost, int begin, int end)
 {
   ECHORAMA_INDEPENDENT
   for (int i = begin; i < end; ++i)

@@ -7,7 +7,6 @@
 // product also), so that bodies that touch move as one on coarse levels at little energy; only what lies between nodes that
 // are no neighbours there is replaced by something diagonal that is stiffer.
 #include "LatticeMultigrid.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include "IndependentLoop.h"
@@ -24,8 +23,8 @@ constexpr int NodesOfATask = 512;       // much more than it costs to start one
 constexpr double ChebyshevRange = 12.0; // errors with eigenvalues down to 1/12 of the largest are smoothed
 
 // One step of the Chebyshev recurrence in one row: step = keep * step + take * inverse * (right - product), next = value + step.
-ECHORAMA_HOT void ChebyshevRow(int count, float keep, float take, const float* product, int padded, const float* const* right,
-                               const float* const* inverse, const float* const* value, float* const* step, float* const* next)
+void ChebyshevRow(int count, float keep, float take, const float* product, int padded, const float* const* right,
+                  const float* const* inverse, const float* const* value, float* const* step, float* const* next)
 {
   const float *p0 = product, *p1 = product + padded, *p2 = product + 2 * padded;
   ECHORAMA_INDEPENDENT

@@ -11,7 +11,6 @@
 // Eight cells of a row are computed at once, a lane each. Rows of cells write to the nodes on both of their sides: layers are
 // therefore done in two turns, even ones and odd ones, and within a layer in order.
 #include "TissueElement.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include <algorithm>
 #include <cmath>
@@ -141,7 +140,7 @@ template <class Pack>
 }
 
 // Adds the forces, unless there is no place for them, and returns the energy of each cell.
-ECHORAMA_HOT void CellForces(const CellRow& row, double* energies)
+void CellForces(const CellRow& row, double* energies)
 {
   const Moduli<DoublePack> moduli = ModuliOf<DoublePack, double>(row);
   DoublePack h[8][9], swelling[8], mean = {}, energy = {};
@@ -194,7 +193,7 @@ ECHORAMA_HOT void CellForces(const CellRow& row, double* energies)
 }
 
 // Adds the stiffness of eight cells to the rows of the matrix at their corners: rows[j + 2 k].
-ECHORAMA_HOT void CellStiffness(const CellRow& row, float* const* rows, int padded, bool tame)
+void CellStiffness(const CellRow& row, float* const* rows, int padded, bool tame)
 {
   const Moduli<FloatPack> moduli = ModuliOf<FloatPack, float>(row);
   FloatPack h[8][9], swelling[8], mean = {};
@@ -288,7 +287,7 @@ ECHORAMA_HOT void CellStiffness(const CellRow& row, float* const* rows, int padd
 }
 
 // J - 1 at the integration points.
-ECHORAMA_HOT void CellSwellings(const CellRow& row, double (*swellings)[Lanes])
+void CellSwellings(const CellRow& row, double (*swellings)[Lanes])
 {
   DoublePack h[8][9];
   Gradients<DoublePack, double>(row, h);

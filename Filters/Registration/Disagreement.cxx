@@ -19,7 +19,6 @@
 // log r goes up and down by (1 - r^2) / (r sqrt(n)), which looks like a peak: how much its second differences are follows from
 // the autocorrelation of the residuals, and only directions in which the Hessian is several times larger are known.
 #include "Disagreement.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/SymmetricMatrix.h"
 #include "Core/Imaging/Sampling.h"
@@ -63,7 +62,7 @@ struct CellPatch {
 };
 
 // sums: ShiftSums numbers for each of the (2 reach + 1)^3 shifts, x fastest.
-ECHORAMA_HOT void SumCell(const CellPatch& p, float* sums)
+void SumCell(const CellPatch& p, float* sums)
 {
   const int count = 2 * p.reach + 1, rows = p.side + 2 * p.reach;
   for (int sz = 0; sz < count; ++sz)

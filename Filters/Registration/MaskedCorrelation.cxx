@@ -10,7 +10,6 @@
 // for come out first and in order, and the way back leaves out other rows and slices, as the way there leaves out those
 // that hold nothing.
 #include "MaskedCorrelation.h"
-#include "Core/Base/Multiversion.h"
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -81,7 +80,7 @@ struct Rows {
 };
 
 // The spectrum of (weights, products).
-ECHORAMA_HOT void MultiplyRow(const Rows& rows, Complex* out)
+void MultiplyRow(const Rows& rows, Complex* out)
 {
   const Complex *halfDifference = rows.halfDifference, *halfSum = rows.halfSum, *z = rows.moving, *opposite = rows.opposite;
   const int count = rows.count;
@@ -91,8 +90,8 @@ ECHORAMA_HOT void MultiplyRow(const Rows& rows, Complex* out)
 }
 
 // The spectra of (sum of f, sum of m) and of (sum of f f, sum of m m), over the overlap.
-ECHORAMA_HOT void MultiplyMoments(const Rows& rows, const Complex* fixedSquares, const Complex* movingSquares, Complex* means,
-                                  Complex* squares)
+void MultiplyMoments(const Rows& rows, const Complex* fixedSquares, const Complex* movingSquares, Complex* means,
+                     Complex* squares)
 {
   for (int i = 0; i < rows.count; ++i) {
     const Complex z = rows.moving[i], zOpposite = rows.opposite[i == 0 ? 0 : rows.count - i];

@@ -2,7 +2,6 @@
 // No branches in the loops over points, so that compilers make them wide. Sums run in lanes of their own, so that the order of
 // additions, and with it the last digit, does not depend on how wide the machine is.
 #include "MetricBlock.h"
-#include "Core/Base/Multiversion.h"
 #include "Metric.h"
 #include <algorithm>
 #include <cmath>
@@ -45,8 +44,7 @@ struct Places {
   float tx[BlockSize], ty[BlockSize], tz[BlockSize], inside[BlockSize];
 };
 
-ECHORAMA_HOT void FindPlaces(const Field& field, const Map& m, const float* px, const float* py, const float* pz, int count,
-                             Places& out)
+void FindPlaces(const Field& field, const Map& m, const float* px, const float* py, const float* pz, int count, Places& out)
 {
   const int row = field.nx, slice = row * field.ny;
   const int lastX = field.nx - 2, lastY = field.ny - 2, lastZ = field.nz - 2;
@@ -79,8 +77,7 @@ inline void TwoVoxels(const SeenVoxel* at, float* out)
 }
 
 // What lies between the voxels: value, index gradient, weight.
-ECHORAMA_HOT void ReadPlaces(const Field& field, const Places& at, int count, float* value, float* weight, float* gx, float* gy,
-                             float* gz)
+void ReadPlaces(const Field& field, const Places& at, int count, float* value, float* weight, float* gx, float* gy, float* gz)
 {
   const std::ptrdiff_t row = field.nx, slice = row * field.ny;
   for (int p = 0; p < count; ++p) {
@@ -112,8 +109,8 @@ ECHORAMA_HOT void ReadPlaces(const Field& field, const Places& at, int count, fl
   }
 }
 
-ECHORAMA_HOT void CompareBlock(const Fit& fit, const float* inside, const float* ours, const float* ourWeight, int count,
-                               float* r, float* r2, float* w, float* covered, float* gx, float* gy, float* gz)
+void CompareBlock(const Fit& fit, const float* inside, const float* ours, const float* ourWeight, int count, float* r, float* r2,
+                  float* w, float* covered, float* gx, float* gy, float* gz)
 {
   const float scale = fit.readScale * SeenVoxel::ValueUnit;
   for (int p = 0; p < count; ++p) {
@@ -145,7 +142,7 @@ inline float Dot12(const float* a, const float* b)
 
 // The sum over channels of r g and g g^T is all that Gauss-Newton needs. With L L^T = sum of g g^T it is the same as of three
 // differences L^-1 (sum of r g) with the columns of L as gradients.
-ECHORAMA_HOT void ReadDescriptorBlock(const Field& field, const Map& m, const BlockOfPoints& points, Terms& t, Condensed& out)
+void ReadDescriptorBlock(const Field& field, const Map& m, const BlockOfPoints& points, Terms& t, Condensed& out)
 {
   const int row = ChannelStride * field.nx, slice = row * field.ny;
   const float endX = static_cast<float>(field.nx - 1), endY = static_cast<float>(field.ny - 1),
@@ -213,8 +210,7 @@ ECHORAMA_HOT void ReadDescriptorBlock(const Field& field, const Map& m, const Bl
   }
 }
 
-ECHORAMA_HOT void PlaceBlock(const Map& toCentre, float scale2, const float* px, const float* py, const float* pz, int count,
-                             Terms& t)
+void PlaceBlock(const Map& toCentre, float scale2, const float* px, const float* py, const float* pz, int count, Terms& t)
 {
   const float inverse = 1.0f / scale2;
   for (int p = 0; p < count; ++p) {
@@ -290,7 +286,7 @@ void Place(const Map& toCentre, float scale2, const BlockOfPoints& b, Terms& t)
   PlaceBlock(toCentre, scale2, b.x, b.y, b.z, b.count, t);
 }
 
-ECHORAMA_HOT void Turn(const Map& worldGradient, Terms& t)
+void Turn(const Map& worldGradient, Terms& t)
 {
   const Map m = worldGradient;
   for (int p = 0; p < BlockSize; ++p) {
@@ -308,7 +304,7 @@ ECHORAMA_HOT void Turn(const Map& worldGradient, Terms& t)
   }
 }
 
-ECHORAMA_HOT void ExplainPatches(const BlockOfPoints& points, float floor, bool isWithSlopes, Terms& t)
+void ExplainPatches(const BlockOfPoints& points, float floor, bool isWithSlopes, Terms& t)
 {
   for (int from = 0; from + PatchSize <= points.count; from += PatchSize) {
     float* r = t.r + from;
@@ -360,7 +356,7 @@ ECHORAMA_HOT void ExplainPatches(const BlockOfPoints& points, float floor, bool 
   }
 }
 
-ECHORAMA_HOT void SumLoss(const Terms& t, float scale2, RawSums& sums)
+void SumLoss(const Terms& t, float scale2, RawSums& sums)
 {
   float lanes[Lanes] = {};
   for (int p = 0; p < BlockSize; p += Lanes)
@@ -376,7 +372,7 @@ ECHORAMA_HOT void SumLoss(const Terms& t, float scale2, RawSums& sums)
   sums.moment[2] += Dot(t.w, t.z);
 }
 
-ECHORAMA_HOT void SumSlopes(Terms& t, RawSums& sums)
+void SumSlopes(Terms& t, RawSums& sums)
 {
   for (int d = 0; d < 6; ++d)
     for (int p = 0; p < BlockSize; ++p)
@@ -389,7 +385,7 @@ ECHORAMA_HOT void SumSlopes(Terms& t, RawSums& sums)
   }
 }
 
-ECHORAMA_HOT void SumFit(const Terms& t, const float* theirs, RawSums& sums)
+void SumFit(const Terms& t, const float* theirs, RawSums& sums)
 {
   float weighted[BlockSize];
   for (int p = 0; p < BlockSize; ++p)
@@ -401,7 +397,7 @@ ECHORAMA_HOT void SumFit(const Terms& t, const float* theirs, RawSums& sums)
   sums.residualTheirs += Dot(weighted, t.r);
 }
 
-ECHORAMA_HOT void SumValues(const Terms& t, const float* ours, RawSums& sums)
+void SumValues(const Terms& t, const float* ours, RawSums& sums)
 {
   float theirs[BlockSize], own[BlockSize];
   for (int p = 0; p < BlockSize; ++p) {

@@ -10,7 +10,6 @@
 // Windows are wide, so they are worked out at half the resolution, an eighth of the voxels, and read between these; what is
 // compared is smoothed by less than a voxel, at full resolution, slice by slice. Beside the result nothing is ever held that has
 // as many voxels as the volume.
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Metric.h"
 #include <algorithm>
@@ -179,7 +178,7 @@ struct RowSums {
   const float *smoothWeight, *smoothValue, *weight, *value, *square;
 };
 
-ECHORAMA_HOT void SeeRow(const float* intensity, const RowSums& sums, const float* trust, float floor, int count, SeenVoxel* out)
+void SeeRow(const float* intensity, const RowSums& sums, const float* trust, float floor, int count, SeenVoxel* out)
 {
   for (int i = 0; i < count; ++i) {
     const bool real = intensity[i] == intensity[i];

@@ -2,7 +2,6 @@
 // A Gaussian along each axis in turn. Every pass is a weighted sum of rows, whether they lie beside, above or behind each
 // other, so one loop serves all three and runs along memory. x and y are done slice by slice, z row by row of a slice, each
 // with a copy that fits in the cache. Cost: about 5 standard deviations of multiplications per voxel and axis.
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Metric.h"
 #include <algorithm>
@@ -26,7 +25,7 @@ template <int Lanes>
 }
 
 // out[i] = sum over t of taps[t] * rows[t][i].
-ECHORAMA_HOT void SumRows(const float* const* rows, const float* taps, int count, int width, float* out)
+void SumRows(const float* const* rows, const float* taps, int count, int width, float* out)
 {
   int i = 0;
   for (; i + Many <= width; i += Many)

@@ -3,7 +3,6 @@
 // order, so the result does not depend on the threads. NaN marks what is not real from the first level on; a child
 // then counts when it equals itself, and the mask is not looked at again.
 #include "Filters/Registration/Pyramid.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/VoxelTypes.h"
 #include <algorithm>
@@ -50,7 +49,7 @@ template <int Step>
 }
 
 // Adds those of a row of children that are real to their parents: each to one, or two of them.
-ECHORAMA_HOT void AddChildren(const float* row, int step, int children, float* sum, float* real)
+void AddChildren(const float* row, int step, int children, float* sum, float* real)
 {
   if (step == 1)
     return AddEvery<1>(row, children, sum, real);
@@ -58,7 +57,7 @@ ECHORAMA_HOT void AddChildren(const float* row, int step, int children, float* s
   AddEvery<2>(row + 1, children / 2, sum, real);
 }
 
-ECHORAMA_HOT void Means(const float* sum, const float* real, float needed, int count, float* mean)
+void Means(const float* sum, const float* real, float needed, int count, float* mean)
 {
   for (int i = 0; i < count; ++i)
     mean[i] = real[i] >= needed ? sum[i] / real[i] : NoValue;

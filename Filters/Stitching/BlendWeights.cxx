@@ -4,7 +4,6 @@
 // Scales are compared to the largest among them, s / max s, before they are raised to the power b: the largest ratio is 1,
 // the sum is at least 1, and nothing underflows that matters, whatever b is.
 #include "BlendWeights.h"
-#include "Core/Base/Multiversion.h"
 #include <algorithm>
 #include <cmath>
 
@@ -120,8 +119,8 @@ BlendPower::BlendPower(double b)
 {
 }
 
-ECHORAMA_HOT void BlendWeights(const float* const* scales, const float* const* factors, std::size_t volumes, std::size_t count,
-                               const BlendPower& power, float* const* weights, float* scratch)
+void BlendWeights(const float* const* scales, const float* const* factors, std::size_t volumes, std::size_t count,
+                  const BlendPower& power, float* const* weights, float* scratch)
 {
   float* const __restrict largest = scratch, * const __restrict total = scratch + count;
   for (std::size_t v = 0; v < volumes; ++v) {
@@ -150,21 +149,21 @@ ECHORAMA_HOT void BlendWeights(const float* const* scales, const float* const* f
 
 // One text for both kinds of numbers.
 #define EchoramaRows(A)                                                                                                          \
-  ECHORAMA_HOT void BlendMean(const BlendRow<A>& row, A* result)                                                                 \
+  void BlendMean(const BlendRow<A>& row, A* result)                                                                              \
   {                                                                                                                              \
     Mean(row.weight, row.value, row.volumes, row.count, result);                                                                 \
   }                                                                                                                              \
-  ECHORAMA_HOT void BlendSplit(const BlendRow<A>& row, A* sum, A* result)                                                        \
+  void BlendSplit(const BlendRow<A>& row, A* sum, A* result)                                                                     \
   {                                                                                                                              \
     Split(row, sum, result);                                                                                                     \
   }                                                                                                                              \
-  ECHORAMA_HOT void ApplyGain(const A* value, A gain, A offset, std::size_t count, A* to)                                        \
+  void ApplyGain(const A* value, A gain, A offset, std::size_t count, A* to)                                                     \
   {                                                                                                                              \
     for (std::size_t i = 0; i < count; ++i)                                                                                      \
       to[i] = gain * value[i] + offset;                                                                                          \
   }                                                                                                                              \
-  ECHORAMA_HOT void ShowAlone(const A* value, const unsigned char* inside, const unsigned char* coverage, A gain, A offset,      \
-                              std::size_t count, A* to)                                                                          \
+  void ShowAlone(const A* value, const unsigned char* inside, const unsigned char* coverage, A gain, A offset,                   \
+                 std::size_t count, A* to)                                                                                       \
   {                                                                                                                              \
     Alone(value, inside, coverage, gain, offset, count, to);                                                                     \
   }

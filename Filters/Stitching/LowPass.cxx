@@ -3,7 +3,6 @@
 // lattice. All volumes are averaged over the same blocks of the output: a lattice of each volume's own would be cheaper, but
 // what aliases would differ from volume to volume, and a place that all see alike would not come out as it is.
 #include "LowPass.h"
-#include "Core/Base/Multiversion.h"
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -23,7 +22,7 @@ constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
 
 // (1 2 1) / 4; a neighbour that is not there is taken to be as the block itself, and a block that is not there becomes the
 // mean of those of its neighbours that are.
-ECHORAMA_HOT void SmoothRow(const float* before, const float* at, const float* behind, int count, float* __restrict to)
+void SmoothRow(const float* before, const float* at, const float* behind, int count, float* __restrict to)
 {
   for (int i = 0; i < count; ++i) {
     const float below = before[i], own = at[i], above = behind[i];
@@ -88,13 +87,13 @@ bool SharedRow(const std::vector<unsigned char>& covered, int first, int step, s
 }
 
 // Of where the volume is (bit 0), what it shares.
-ECHORAMA_HOT void KeepShared(const unsigned char* shared, int count, unsigned char* __restrict inside)
+void KeepShared(const unsigned char* shared, int count, unsigned char* __restrict inside)
 {
   for (int i = 0; i < count; ++i)
     inside[i] &= shared[i];
 }
 
-ECHORAMA_HOT void AddSquaredDifferences(const float* a, const float* b, std::ptrdiff_t count, float* __restrict to)
+void AddSquaredDifferences(const float* a, const float* b, std::ptrdiff_t count, float* __restrict to)
 {
   for (std::ptrdiff_t i = 0; i < count; ++i)
     to[i] += (a[i] - b[i]) * (a[i] - b[i]);
@@ -103,8 +102,8 @@ ECHORAMA_HOT void AddSquaredDifferences(const float* a, const float* b, std::ptr
 constexpr std::ptrdiff_t blocksOfOneTask = 1 << 15;
 
 // Adds a row of voxels to the sums of its columns, in double: the mean of equal floats is that float.
-ECHORAMA_HOT void AddColumns(const float* value, const unsigned char* inside, int count, double* __restrict sum,
-                             double* __restrict square, double* __restrict counted)
+void AddColumns(const float* value, const unsigned char* inside, int count, double* __restrict sum, double* __restrict square,
+                double* __restrict counted)
 {
   for (int i = 0; i < count; ++i) {
     const double here = inside[i] != 0 ? 1.0 : 0.0, own = static_cast<double>(inside[i] != 0 ? value[i] : 0.0f);

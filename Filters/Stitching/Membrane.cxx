@@ -11,7 +11,6 @@
 // over the unknowns are fused (MembraneLevels::Sweep): a round reads and writes the finest level about four times.
 #include "Membrane.h"
 #include "Core/Base/ElapsedTime.h"
-#include "Core/Base/Multiversion.h"
 #include "MembraneLanes.h"
 #include "MembraneLevels.h"
 #include <algorithm>
@@ -39,9 +38,9 @@ float OfBits(std::int32_t bits)
 
 // load - A u, where known values are part of u; returns the largest magnitude. (Floats that are not negative have the order of
 // their bits.)
-ECHORAMA_HOT std::int32_t ResidualOf(const double* u, const double* below, const double* above, const double* before,
-                                     const double* behind, const unsigned char* codes, double load, double wx, double wy,
-                                     double wz, int begin, int end, float* __restrict residual)
+std::int32_t ResidualOf(const double* u, const double* below, const double* above, const double* before, const double* behind,
+                        const unsigned char* codes, double load, double wx, double wy, double wz, int begin, int end,
+                        float* __restrict residual)
 {
   std::int32_t largest[MembraneByteLanes] = {};
   ForLanes<MembraneByteLanes>(
@@ -72,10 +71,9 @@ struct Products { // of the correction e, the last direction p, and the residual
 };
 
 // A is a sum over faces: (a, A b) = sum of diagonal a b - sum over both sides of faces of w a b.
-ECHORAMA_HOT void AddProducts(const float* e, const float* eBelow, const float* eAbove, const float* eBefore,
-                              const float* eBehind, const float* p, const float* pBelow, const float* pAbove,
-                              const float* pBefore, const float* pBehind, const float* r, const unsigned char* codes, float wx,
-                              float wy, float wz, int begin, int end, double* sums)
+void AddProducts(const float* e, const float* eBelow, const float* eAbove, const float* eBefore, const float* eBehind,
+                 const float* p, const float* pBelow, const float* pAbove, const float* pBefore, const float* pBehind,
+                 const float* r, const unsigned char* codes, float wx, float wy, float wz, int begin, int end, double* sums)
 {
   float lanes[5][MembraneByteLanes] = {};
   ForLanes<MembraneByteLanes>(
@@ -99,8 +97,7 @@ ECHORAMA_HOT void AddProducts(const float* e, const float* eBelow, const float* 
       sums[n] += static_cast<double>(lanes[n][l]);
 }
 
-ECHORAMA_HOT void Advance(double* u, float* p, const float* e, float alongE, float alongP, std::ptrdiff_t begin,
-                          std::ptrdiff_t end)
+void Advance(double* u, float* p, const float* e, float alongE, float alongP, std::ptrdiff_t begin, std::ptrdiff_t end)
 {
   for (int i = begin; i < end; ++i) {
     p[i] = alongE * e[i] + alongP * p[i];
@@ -109,9 +106,8 @@ ECHORAMA_HOT void Advance(double* u, float* p, const float* e, float alongE, flo
 }
 
 // Codes of unknowns (kind 1): how many neighbours along each axis are not void.
-ECHORAMA_HOT void CountNeighbours(const unsigned char* kind, const unsigned char* below, const unsigned char* above,
-                                  const unsigned char* before, const unsigned char* behind, int begin, int end,
-                                  unsigned char* code)
+void CountNeighbours(const unsigned char* kind, const unsigned char* below, const unsigned char* above,
+                     const unsigned char* before, const unsigned char* behind, int begin, int end, unsigned char* code)
 {
   for (int i = begin; i < end; ++i) {
     const int count = (kind[i - 1] != 0) + (kind[i + 1] != 0) + 4 * ((below[i] != 0) + (above[i] != 0)) +

@@ -7,7 +7,6 @@
 //
 // That is some hundred times sharper than the largest residual times the longest time that heat spends in the overlap: large
 // residuals are rare.
-#include "Core/Base/Multiversion.h"
 #include "MembraneLanes.h"
 #include "MembraneLevels.h"
 #include <cmath>
@@ -19,16 +18,16 @@ namespace {
 constexpr int SpreadSweeps = 3;
 constexpr float Upwards = 1.0f + 1e-6f; // more than a float is rounded by
 
-ECHORAMA_HOT void RaiseRow(float* r, const unsigned char* codes, float floor, int begin, int end)
+void RaiseRow(float* r, const unsigned char* codes, float floor, int begin, int end)
 {
   for (int i = begin; i < end; ++i)
     r[i] = (codes[i] & MembraneCounts) != 0 ? std::abs(r[i]) * Upwards + floor : 0.0f;
 }
 
 // How many unknowns of a row have A w < part s (some may count twice), and their largest w.
-ECHORAMA_HOT int CountLacking(const float* w, const float* below, const float* above, const float* before, const float* behind,
-                              const float* s, const unsigned char* codes, double wx, double wy, double wz, double part, int begin,
-                              int end, float* __restrict largest)
+int CountLacking(const float* w, const float* below, const float* above, const float* before, const float* behind, const float* s,
+                 const unsigned char* codes, double wx, double wy, double wz, double part, int begin, int end,
+                 float* __restrict largest)
 {
   int lacking[MembraneByteLanes] = {};
   float most[MembraneByteLanes] = {};

@@ -4,7 +4,6 @@
 // summed in the cell; KnownTie is what is left of them one level up, for they end at the known voxel and not at a cell's
 // centre (between 5/8 and 1 in one dimension, depending on how cells fall; smaller makes cycles overshoot there).
 #include "Core/Base/Error.h"
-#include "Core/Base/Multiversion.h"
 #include "MembraneLevels.h"
 #include <algorithm>
 #include <cmath>
@@ -17,9 +16,9 @@ constexpr std::ptrdiff_t CellsOfOneTask = 32768;
 constexpr std::ptrdiff_t CoarsestUnknowns = 200; // solved directly
 
 // Ties of a row of the finest level to lower neighbours, and to known voxels; 0 where there is no unknown.
-ECHORAMA_HOT void TiesOfVoxels(const unsigned char* code, const unsigned char* below, const unsigned char* above,
-                               const unsigned char* before, const unsigned char* behind, float wx, float wy, float wz, int begin,
-                               int end, float* __restrict x, float* __restrict y, float* __restrict z, float* __restrict known)
+void TiesOfVoxels(const unsigned char* code, const unsigned char* below, const unsigned char* above, const unsigned char* before,
+                  const unsigned char* behind, float wx, float wy, float wz, int begin, int end, float* __restrict x,
+                  float* __restrict y, float* __restrict z, float* __restrict known)
 {
   const auto is = [](unsigned char c) { return (c & MembraneCounts) != 0 ? 1 : 0; };
   for (int i = begin; i < end; ++i) {
@@ -34,13 +33,13 @@ ECHORAMA_HOT void TiesOfVoxels(const unsigned char* code, const unsigned char* b
 }
 
 // As AddToCells, but of each cell's voxels only the lower one.
-ECHORAMA_HOT void AddLower(const float* from, float factor, int begin, int end, float* __restrict to)
+void AddLower(const float* from, float factor, int begin, int end, float* __restrict to)
 {
   for (int cell = (begin + 1) >> 1; cell < (end + 1) >> 1; ++cell)
     to[cell] += factor * from[2 * cell];
 }
 
-ECHORAMA_HOT void JoinKinds(const unsigned char* kind, int begin, int end, bool halved, unsigned char* __restrict to)
+void JoinKinds(const unsigned char* kind, int begin, int end, bool halved, unsigned char* __restrict to)
 {
   for (int i = begin; i < end && !halved; ++i)
     to[i] |= kind[i];
@@ -56,7 +55,7 @@ ECHORAMA_HOT void JoinKinds(const unsigned char* kind, int begin, int end, bool 
 
 } // namespace
 
-ECHORAMA_HOT void AddToCells(const float* from, float factor, int begin, int end, bool halved, float* __restrict to)
+void AddToCells(const float* from, float factor, int begin, int end, bool halved, float* __restrict to)
 {
   for (int i = begin; i < end && !halved; ++i)
     to[i] += factor * from[i];

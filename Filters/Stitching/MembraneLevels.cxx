@@ -9,7 +9,6 @@
 // Interpolation is trilinear. Known cells hold 0; cells of the void, which the linear weights also reach, are filled with the
 // mean of their neighbours, and restriction is the transpose of all that.
 #include "MembraneLevels.h"
-#include "Core/Base/Multiversion.h"
 #include "MembraneLanes.h"
 #include <algorithm>
 #include <cmath>
@@ -45,9 +44,8 @@ struct Around { // a row of values and its four neighbours, each by x
 }
 
 // Of one colour; those of the other are only read, so the order within a row does not matter.
-ECHORAMA_HOT void RelaxFine(float* own, const float* below, const float* above, const float* before, const float* behind,
-                            const float* right, const unsigned char* codes, float wx, float wy, float wz, int begin, int end,
-                            int parity, float* __restrict step)
+void RelaxFine(float* own, const float* below, const float* above, const float* before, const float* behind, const float* right,
+               const unsigned char* codes, float wx, float wy, float wz, int begin, int end, int parity, float* __restrict step)
 {
   if (wx == 1.0f && wy == 1.0f && wz == 1.0f) { // then the diagonal is a sum of bytes
     ForLanes<MembraneByteLanes>(
@@ -73,8 +71,8 @@ ECHORAMA_HOT void RelaxFine(float* own, const float* below, const float* above, 
     own[i] += step[i];
 }
 
-ECHORAMA_HOT void StartFine(float* own, const float* right, const unsigned char* codes, float wx, float wy, float wz, int begin,
-                            int end, int parity)
+void StartFine(float* own, const float* right, const unsigned char* codes, float wx, float wy, float wz, int begin, int end,
+               int parity)
 {
   ForLanes<MembraneByteLanes>(
       begin, end, [&](int i, int, float) __attribute__((always_inline)) {
@@ -82,9 +80,9 @@ ECHORAMA_HOT void StartFine(float* own, const float* right, const unsigned char*
       });
 }
 
-ECHORAMA_HOT void ResidualFine(const float* own, const float* below, const float* above, const float* before, const float* behind,
-                               const float* right, const unsigned char* codes, float wx, float wy, float wz, int begin, int end,
-                               float* __restrict residual)
+void ResidualFine(const float* own, const float* below, const float* above, const float* before, const float* behind,
+                  const float* right, const unsigned char* codes, float wx, float wy, float wz, int begin, int end,
+                  float* __restrict residual)
 {
   ForLanes<MembraneByteLanes>(
       begin, end, [&](int i, int, float) __attribute__((always_inline)) {
@@ -94,9 +92,9 @@ ECHORAMA_HOT void ResidualFine(const float* own, const float* below, const float
       });
 }
 
-ECHORAMA_HOT void RelaxCoarse(float* own, const float* below, const float* above, const float* before, const float* behind,
-                              const float* x, const float* y, const float* yNext, const float* z, const float* zNext,
-                              const float* inverse, const float* right, int begin, int end, int parity, float* __restrict step)
+void RelaxCoarse(float* own, const float* below, const float* above, const float* before, const float* behind, const float* x,
+                 const float* y, const float* yNext, const float* z, const float* zNext, const float* inverse, const float* right,
+                 int begin, int end, int parity, float* __restrict step)
 {
   ForLanes<MembraneFloatLanes>(
       begin, end, [&](int i, int, float) __attribute__((always_inline)) {
@@ -109,16 +107,15 @@ ECHORAMA_HOT void RelaxCoarse(float* own, const float* below, const float* above
     own[i] += step[i];
 }
 
-ECHORAMA_HOT void StartCoarse(float* own, const float* right, const float* inverse, int begin, int end, int parity)
+void StartCoarse(float* own, const float* right, const float* inverse, int begin, int end, int parity)
 {
   ForLanes<MembraneFloatLanes>(
       begin, end, [&](int i, int, float) __attribute__((always_inline)) { own[i] = Take(i, parity, 1) * right[i] * inverse[i]; });
 }
 
-ECHORAMA_HOT void ResidualCoarse(const float* own, const float* below, const float* above, const float* before,
-                                 const float* behind, const float* x, const float* y, const float* yNext, const float* z,
-                                 const float* zNext, const float* inverse, const float* right, int begin, int end,
-                                 float* __restrict residual)
+void ResidualCoarse(const float* own, const float* below, const float* above, const float* before, const float* behind,
+                    const float* x, const float* y, const float* yNext, const float* z, const float* zNext, const float* inverse,
+                    const float* right, int begin, int end, float* __restrict residual)
 {
   ForLanes<MembraneFloatLanes>(
       begin, end, [&](int i, int, float) __attribute__((always_inline)) {
@@ -130,7 +127,7 @@ ECHORAMA_HOT void ResidualCoarse(const float* own, const float* below, const flo
 }
 
 // Two voxels of a row share a cell; each gives three quarters to its own and one to the nearest other.
-ECHORAMA_HOT void HalveRow(const float* fine, float* __restrict coarse, int begin, int end)
+void HalveRow(const float* fine, float* __restrict coarse, int begin, int end)
 {
   ForLanes<MembraneFloatLanes>(
       begin, end, [&](int i, int, float) __attribute__((always_inline)) {
@@ -138,7 +135,7 @@ ECHORAMA_HOT void HalveRow(const float* fine, float* __restrict coarse, int begi
       });
 }
 
-ECHORAMA_HOT void DoubleRow(const float* coarse, float* __restrict fine, int begin, int end)
+void DoubleRow(const float* coarse, float* __restrict fine, int begin, int end)
 {
   ForLanes<MembraneFloatLanes>(
       begin, end, [&](int i, int, float) __attribute__((always_inline)) {
@@ -147,14 +144,14 @@ ECHORAMA_HOT void DoubleRow(const float* coarse, float* __restrict fine, int beg
       });
 }
 
-ECHORAMA_HOT void AddRow(const float* from, float weight, float* to, int begin, int end)
+void AddRow(const float* from, float weight, float* to, int begin, int end)
 {
   ECHORAMA_MEMBRANE_SEPARATE
   for (int i = begin; i < end; ++i)
     to[i] += weight * from[i];
 }
 
-ECHORAMA_HOT void PutFine(const float* from, const unsigned char* codes, float keep, float* to, int begin, int end)
+void PutFine(const float* from, const unsigned char* codes, float keep, float* to, int begin, int end)
 {
   ForLanes<MembraneByteLanes>(
       begin, end, [&](int i, int, float fresh) __attribute__((always_inline)) {
@@ -163,7 +160,7 @@ ECHORAMA_HOT void PutFine(const float* from, const unsigned char* codes, float k
       });
 }
 
-ECHORAMA_HOT void PutCoarse(const float* from, const float* inverse, float keep, float* to, int begin, int end)
+void PutCoarse(const float* from, const float* inverse, float keep, float* to, int begin, int end)
 {
   ECHORAMA_MEMBRANE_SEPARATE
   for (int i = begin; i < end; ++i)

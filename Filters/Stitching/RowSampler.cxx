@@ -8,7 +8,6 @@
 // no index arithmetic and runs in vector registers, and a shift by whole voxels copies exactly.
 // Through a displacement rows are not straight: every voxel's position is computed, and Sampler reads there.
 #include "RowSampler.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Imaging/VoxelTypes.h"
 #include <algorithm>
 #include <cmath>
@@ -75,12 +74,12 @@ template <class T, class A>
 
 // One text for all kinds of numbers.
 #define EchoramaMix(T, A)                                                                                                        \
-  ECHORAMA_HOT void Mix(const Corners<T>& corners, const Places<A>& places, int count, A* values)                                \
+  void Mix(const Corners<T>& corners, const Places<A>& places, int count, A* values)                                             \
   {                                                                                                                              \
     MixCorners(corners, places, count, values);                                                                                  \
   }
 #define EchoramaChunk(A)                                                                                                         \
-  ECHORAMA_HOT void Place(const double* start, const double* step, int first, int count, Places<A>& places)                      \
+  void Place(const double* start, const double* step, int first, int count, Places<A>& places)                                   \
   {                                                                                                                              \
     PlaceVoxels(start, step, first, count, places);                                                                              \
   }                                                                                                                              \

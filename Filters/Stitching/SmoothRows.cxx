@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Along x, then y, then z, as RowSampler goes. At the rim of the lattice the last block goes on.
 #include "SmoothRows.h"
-#include "Core/Base/Multiversion.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -35,14 +34,14 @@ template <class A>
 }
 
 #define EchoramaRows(A)                                                                                                          \
-  ECHORAMA_HOT void Stretch(const float* padded, const int* offsets, const A* fractions, int size, int blocks, A* to)            \
+  void Stretch(const float* padded, const int* offsets, const A* fractions, int size, int blocks, A* to)                         \
   {                                                                                                                              \
     if (size == 2) /* known, so that it becomes vector instructions */                                                           \
       StretchRow(padded, offsets, fractions, 2, blocks, to);                                                                     \
     else                                                                                                                         \
       StretchRow(padded, offsets, fractions, size, blocks, to);                                                                  \
   }                                                                                                                              \
-  ECHORAMA_HOT bool Mix(const A* a, const A* b, const A* c, const A* d, A y, A z, const unsigned char* wanted, int count, A* to) \
+  bool Mix(const A* a, const A* b, const A* c, const A* d, A y, A z, const unsigned char* wanted, int count, A* to)              \
   {                                                                                                                              \
     return MixRows(a, b, c, d, y, z, wanted, count, to);                                                                         \
   }

@@ -2,7 +2,6 @@
 // One volume after the other, so that the maps or levels of one live at a time; what is kept are the scales of the overlap.
 #include "StitchScales.h"
 #include "BlendWeights.h"
-#include "Core/Base/Multiversion.h"
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -109,14 +108,14 @@ RowField<float> DepthScale(const RegionMap& regions, int volume, const Progress&
 // What the voxels of a row are to the membrane of a volume, before other volumes' cores and membranes are looked at: beside the
 // volume's box, where \a kind comes in as the coverage, and within it, where \a mask says where it is (bit 0) and has its core
 // (bit 1).
-ECHORAMA_HOT void BeginBeside(int count, unsigned char* kind)
+void BeginBeside(int count, unsigned char* kind)
 {
   for (int i = 0; i < count; ++i)
     kind[i] = static_cast<unsigned char>(kind[i] != 0 ? MembraneVoxel::Known : MembraneVoxel::Void);
 }
 
-ECHORAMA_HOT void BeginWithin(const unsigned char* coverage, const unsigned char* mask, int count, unsigned char* __restrict kind,
-                              float* __restrict value)
+void BeginWithin(const unsigned char* coverage, const unsigned char* mask, int count, unsigned char* __restrict kind,
+                 float* __restrict value)
 {
   for (int i = 0; i < count; ++i) {
     const int here = mask[i] & 1, alone = here & (coverage[i] == 1 ? 1 : mask[i] >> 1);

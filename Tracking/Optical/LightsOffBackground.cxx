@@ -3,14 +3,13 @@
 // s, with s' = (1 - w)^2 s + w^2. Rows are taken one by one, in bytes and floats.
 #include "LightsOffBackground.h"
 #include "Core/Base/CheckRange.h"
-#include "Core/Base/Multiversion.h"
 #include <algorithm>
 
 namespace echorama {
 
 namespace {
 
-ECHORAMA_HOT void AddRow(const std::uint8_t* row, int count, float weight, float* mean, std::uint8_t* rounded)
+void AddRow(const std::uint8_t* row, int count, float weight, float* mean, std::uint8_t* rounded)
 {
   for (int x = 0; x < count; ++x) {
     mean[x] += weight * (static_cast<float>(row[x]) - mean[x]);

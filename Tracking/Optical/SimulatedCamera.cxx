@@ -13,7 +13,6 @@
 // With a rolling shutter row r is exposed r row times later than the first: by the place that the light then has.
 #include "SimulatedCamera.h"
 #include "Core/Base/Angles.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Base/Random.h"
 #include "Tracking/Optical/MarkerPattern.h"
@@ -100,7 +99,7 @@ private:
   std::vector<float> body_, tail_;
 };
 
-ECHORAMA_HOT void Develop(const float* grey, const float* normal, int count, float readVariance, float gain, std::uint8_t* out)
+void Develop(const float* grey, const float* normal, int count, float readVariance, float gain, std::uint8_t* out)
 {
   for (int x = 0; x < count; ++x) {
     const float level = grey[x] > 0.0f ? grey[x] : 0.0f;

@@ -11,7 +11,6 @@
 // Nothing that is smaller than the lens can draw is a spot: hot pixels are refused by their size.
 #include "SpotDetector.h"
 #include "Core/Base/JoinedSets.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/NumberText.h"
 #include <algorithm>
 #include <array>
@@ -53,7 +52,7 @@ constexpr double WorstAlone = 8.0; // chi squared
 constexpr double OwnLight = 0.15;  // of a spot's peak: what is weaker beside it is no other light
 
 // The largest excess of the frame over the floor, and the largest value of the frame.
-ECHORAMA_HOT void Largest(const std::uint8_t* frame, const std::uint8_t* floor, int count, int& excess, int& value)
+void Largest(const std::uint8_t* frame, const std::uint8_t* floor, int count, int& excess, int& value)
 {
   std::uint8_t largest = 0, brightest = 0;
   for (int x = 0; x < count; ++x) {
@@ -66,7 +65,7 @@ ECHORAMA_HOT void Largest(const std::uint8_t* frame, const std::uint8_t* floor, 
   value = brightest;
 }
 
-ECHORAMA_HOT int CountFrom(const std::uint8_t* frame, int count, std::uint8_t level)
+int CountFrom(const std::uint8_t* frame, int count, std::uint8_t level)
 {
   int sum = 0;
   for (int begin = 0; begin < count; begin += 128) {
@@ -79,7 +78,7 @@ ECHORAMA_HOT int CountFrom(const std::uint8_t* frame, int count, std::uint8_t le
   return sum;
 }
 
-ECHORAMA_HOT void Ramp(float from, float step, int count, std::uint8_t* out)
+void Ramp(float from, float step, int count, std::uint8_t* out)
 {
   for (int x = 0; x < count; ++x)
     out[x] = static_cast<std::uint8_t>(from + step * static_cast<float>(x) + 0.5f);

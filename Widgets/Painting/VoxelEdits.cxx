@@ -9,7 +9,6 @@
 #include "VoxelEdits.h"
 
 #include "Core/Base/Error.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/VoxelTypes.h"
 #include <algorithm>
@@ -29,7 +28,7 @@ constexpr std::ptrdiff_t BlocksPerTask = 16;
 
 // Squared distances (mm^2) of eight voxels in a row from the path a + t ab, t in [0, 1]; perSquare = 1 / |ab|^2, or 0 for a
 // point. first: from a to the first voxel; spacing: to the next, along x.
-ECHORAMA_HOT void DistancesOfRow(const double* first, double spacing, const double* ab, double perSquare, double* squared)
+void DistancesOfRow(const double* first, double spacing, const double* ab, double perSquare, double* squared)
 {
   for (int i = 0; i < Side; ++i) {
     const double x = first[0] + i * spacing, y = first[1], z = first[2];

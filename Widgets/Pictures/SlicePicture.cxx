@@ -12,7 +12,6 @@
 #include "SlicePicture.h"
 
 #include "Core/Base/Error.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/Sampling.h"
 #include <algorithm>
@@ -183,11 +182,11 @@ inline __attribute__((always_inline)) void SingleSamples(const Source<T>& source
 }
 
 #define EchoramaSliceRows(T)                                                                                                     \
-  ECHORAMA_HOT void LinearRow(const Source<T>& source, const Row& row, float* grey)                                              \
+  void LinearRow(const Source<T>& source, const Row& row, float* grey)                                                           \
   {                                                                                                                              \
     LinearPixels(source, row, grey);                                                                                             \
   }                                                                                                                              \
-  ECHORAMA_HOT void SingleRow(const Source<T>& source, const Row& row, bool linear, float* grey)                                 \
+  void SingleRow(const Source<T>& source, const Row& row, bool linear, float* grey)                                              \
   {                                                                                                                              \
     SingleSamples(source, row, linear, grey);                                                                                    \
   }
@@ -207,8 +206,8 @@ struct Sums {
   std::vector<float> top;              // the largest opacity
 };
 
-ECHORAMA_HOT void AddRow(const float* grey, int begin, int end, float opacity, const float* colour, float* __restrict red,
-                         float* __restrict green, float* __restrict blue, float* __restrict weight, float* __restrict top)
+void AddRow(const float* grey, int begin, int end, float opacity, const float* colour, float* __restrict red,
+            float* __restrict green, float* __restrict blue, float* __restrict weight, float* __restrict top)
 {
   const float r = opacity * colour[0], g = opacity * colour[1], b = opacity * colour[2];
   for (int i = begin; i < end; ++i) {
@@ -224,8 +223,8 @@ ECHORAMA_HOT void AddRow(const float* grey, int begin, int end, float opacity, c
 }
 
 // Means of one side, as bytes.
-ECHORAMA_HOT void MeanRow(const float* red, const float* green, const float* blue, const float* weight, const float* top,
-                          int count, std::uint8_t* __restrict rgba)
+void MeanRow(const float* red, const float* green, const float* blue, const float* weight, const float* top, int count,
+             std::uint8_t* __restrict rgba)
 {
   for (int i = 0; i < count; ++i) {
     const float scale = weight[i] > 0.0f ? 255.0f / weight[i] : 0.0f;
@@ -360,8 +359,7 @@ void DrawRows(const std::vector<Drawn>& drawn, const SliceParameters& parameters
 }
 
 // The samples of two rows, mixed: (step - part) lower + part upper, per byte.
-ECHORAMA_HOT void MixRows(const std::uint8_t* lower, const std::uint8_t* upper, int bytes, int step, int part,
-                          std::uint16_t* __restrict mixed)
+void MixRows(const std::uint8_t* lower, const std::uint8_t* upper, int bytes, int step, int part, std::uint16_t* __restrict mixed)
 {
   for (int i = 0; i < bytes; ++i)
     mixed[i] = static_cast<std::uint16_t>((step - part) * lower[i] + part * upper[i]);

@@ -12,7 +12,6 @@
 // Cost: rounds * n^6 * points trilinear reads.
 #include "Filters/Registration/Benchmarks/AlignSearch.h"
 #include "Core/Base/Angles.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/Sampling.h"
 #include "Core/Imaging/ValidPoints.h"
@@ -68,8 +67,8 @@ inline void AddCorner(float v, float v0, float w, float& sum, float& weights)
 // Reads a field at up to BlockSize moved points: the difference to the values they carry, and whether they lie inside.
 // The reading is Sampler::Linear in single precision on voxels that are their own mask: the nearest voxel decides what is
 // inside, corners that are not real have no say. No branches, so that compilers make it wide.
-ECHORAMA_HOT void Differences(const PlainField& field, const Map& m, const float* px, const float* py, const float* pz,
-                              const float* value, int count, float* difference, int* inside)
+void Differences(const PlainField& field, const Map& m, const float* px, const float* py, const float* pz, const float* value,
+                 int count, float* difference, int* inside)
 {
   const float* voxels = field.voxels;
   const int row = field.nx, slice = field.nx * field.ny;

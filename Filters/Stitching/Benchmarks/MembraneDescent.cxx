@@ -7,7 +7,6 @@
 // the width, which is what the coarse levels are for, and what their sampled borders bring back in.
 #include "Filters/Stitching/Benchmarks/MembraneDescent.h"
 #include "Core/Base/Error.h"
-#include "Core/Base/Multiversion.h"
 #include "Core/Base/Parallel.h"
 #include "Filters/Stitching/MembraneLanes.h"
 #include <algorithm>
@@ -45,8 +44,8 @@ struct DescentGrid {
 };
 
 // g := minus half the gradient of the energy at the unknowns of a row; returns its square.
-ECHORAMA_HOT double GradientRow(const float* u, const unsigned char* kinds, std::ptrdiff_t row, std::ptrdiff_t slice, float wx,
-                                float wy, float wz, int count, float* __restrict g)
+double GradientRow(const float* u, const unsigned char* kinds, std::ptrdiff_t row, std::ptrdiff_t slice, float wx, float wy,
+                   float wz, int count, float* __restrict g)
 {
   float sums[MembraneByteLanes] = {};
   ForLanes<MembraneByteLanes>(
@@ -67,8 +66,8 @@ ECHORAMA_HOT double GradientRow(const float* u, const unsigned char* kinds, std:
 }
 
 // (g, A g) of a row.
-ECHORAMA_HOT double CurvatureRow(const float* g, const unsigned char* kinds, std::ptrdiff_t row, std::ptrdiff_t slice, float wx,
-                                 float wy, float wz, int count)
+double CurvatureRow(const float* g, const unsigned char* kinds, std::ptrdiff_t row, std::ptrdiff_t slice, float wx, float wy,
+                    float wz, int count)
 {
   float sums[MembraneByteLanes] = {};
   ForLanes<MembraneByteLanes>(
@@ -86,7 +85,7 @@ ECHORAMA_HOT double CurvatureRow(const float* g, const unsigned char* kinds, std
   return sum;
 }
 
-ECHORAMA_HOT void StepRow(float* u, const float* g, float length, int count)
+void StepRow(float* u, const float* g, float length, int count)
 {
   for (int i = 0; i < count; ++i)
     u[i] += length * g[i];
