@@ -54,7 +54,7 @@ public:
                                              " to look at all of the volume, and " + Gigabytes(settings.bytes) + " are allowed");
     const auto& n = data.dimensions;
     const double sliceBytes = static_cast<double>(n[0]) * n[1] * (sizeof(T) + 1.0);
-    slicesAtATime_ = std::clamp(static_cast<int>(0.2 * settings.bytes / sliceBytes), 1, std::min(64, n[2]));
+    slicesAtATime_ = std::clamp(static_cast<int>(0.1 * settings.bytes / sliceBytes), 1, std::min(64, n[2]));
     coarse_ = data;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       coarse_.dimensions[axis] = (n[axis] + factor_ - 1) / factor_;
@@ -224,11 +224,12 @@ private:
     return EmbedMemory(settings_.embed, grid) + static_cast<double>(grid.VoxelCount()) * (2.0 * sizeof(T) + 4.0);
   }
 
-  // What making a slab takes: slices of the data, the slab, a brick, and the sums and statistics of blocks.
+  // What making a slab takes: slices of the data, and once more those that are taken (they are the input's as well), the slab, a
+  // brick, and the sums and statistics of blocks.
   double SlabBytes(int slices) const
   {
     const auto& n = grid_.dimensions;
-    const double held = std::min(data_.dimensions[2], slices + Halo(2) + (reach_ + 2) * blocks_.size[2]) + slicesAtATime_;
+    const double held = std::min(data_.dimensions[2], slices + Halo(2) + (reach_ + 2) * blocks_.size[2]) + 2.0 * slicesAtATime_;
     double brick = 1.0;
     for (std::size_t axis = 0; axis < 3; ++axis)
       brick *= std::min(n[axis], (axis < 2 ? brickEdge : slices) + 2 * Halo(axis));
