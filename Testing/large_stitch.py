@@ -4,7 +4,7 @@
 `echorama stitch` and `echorama embed`, and prints time and peak memory of each: 200 volumes of 128^3 in ten rows over 2,000 x 2,000 x
 1,000 voxels, or a part of these.
 
-    python3 Testing/large_stitch.py build/release/bin/echorama FOLDER [--size 2000 2000 1000] [--memory 2.4] [--embed 3.8]
+    python3 Testing/large_stitch.py build/release/bin/echorama FOLDER [--size 2000 2000 1000] [--memory 2.4] [--embed 4]
 
 FOLDER gets the volumes and the results; some 0.8 GB in the full size, and 3 more where it is embedded.
 """
