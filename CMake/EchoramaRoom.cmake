@@ -30,7 +30,7 @@ function(echorama_add_room name)
   endif()
 endfunction()
 
-# The library of a room's kernels, or a second one of the same name for CPUs of a level of x86-64.
+# The library of a room's kernels, or another of the same name for CPUs of a level of x86-64.
 macro(_echorama_add_kernel_library target level)
   add_dependencies(kernels ${target})
   add_library(${target} SHARED ${kernels})

@@ -13,6 +13,13 @@ set(ECHORAMA_EIGEN_INTERFACE EIGEN_MAX_ALIGN_BYTES=16 EIGEN_MALLOC_ALREADY_ALIGN
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
 set(CMAKE_LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib)
 set(CMAKE_ARCHIVE_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib)
+# Kernels of levels that are not built any more would be taken all the same.
+file(GLOB levels RELATIVE ${CMAKE_LIBRARY_OUTPUT_DIRECTORY}/glibc-hwcaps ${CMAKE_LIBRARY_OUTPUT_DIRECTORY}/glibc-hwcaps/*)
+foreach(level IN LISTS levels)
+  if(NOT level IN_LIST ECHORAMA_CPU_LEVELS)
+    file(REMOVE_RECURSE ${CMAKE_LIBRARY_OUTPUT_DIRECTORY}/glibc-hwcaps/${level})
+  endif()
+endforeach()
 # Installed libraries find each other wherever the tree is put: kernels lie in lib, the plugin below it, programs in bin, the
 # Python package in python3/dist-packages/echorama.
 set(CMAKE_INSTALL_RPATH "$ORIGIN;$ORIGIN/..;$ORIGIN/../../..;$ORIGIN/../${CMAKE_INSTALL_LIBDIR};$ORIGIN/../../../${CMAKE_INSTALL_LIBDIR}")

@@ -48,18 +48,22 @@ pipeline() {
   echorama info demo/stitched.vdb | grep OpenVDB
   echorama info demo/embedded.mha | grep -i voxels
 }
-cpu_levels() { # the loader takes the kernels of the highest level that the machine runs; all give the same voxels
+cpu_levels() { # the loader takes the kernels of the highest level that the machine runs; all stitch the same voxels
   local loader=/lib64/ld-linux-x86-64.so.2 program level folder
   program=$(command -v echorama)
   for level in x86-64-v2 x86-64-v3 x86-64-v4; do
     "$loader" --help | grep "$level (supported" || continue
     folder=glibc-hwcaps/$level
     [ "$level" != x86-64-v2 ] || folder=x86_64-linux-gnu
-    "$loader" --glibc-hwcaps-mask "$level" --list "$program" | grep "/$folder/libEchoramaCoreKernels"
-    "$loader" --glibc-hwcaps-mask "$level" "$program" stitch demo/volume_*.mha --poses demo/poses.json -o level.mha
+    taken_from "$folder" "$loader" --glibc-hwcaps-mask "$level" "$program" stitch demo/volume_*.mha --poses demo/poses.json -o level.mha
     cmp level.mha demo/stitched.mha
   done
-  ldd "$program" | grep "/$folder/libEchoramaCoreKernels"
+  taken_from "$folder" "$program" info demo/stitched.vdb
+}
+taken_from() { # FOLDER COMMAND...: all kernels that the command loads, one at least, lie there
+  LD_DEBUG=files "${@:2}" 2>&1 | sed -n 's/.*calling init: \(.*libEchorama[A-Za-z]*Kernels\.so.*\)/\1/p' >kernels
+  grep "/$1/libEchorama" kernels
+  ! grep -v "/$1/libEchorama" kernels
 }
 python_package() {
   cat >python.py <<'END'

@@ -49,12 +49,13 @@ public:
     const int most = static_cast<int>(settings.embed.smoothMm / 3.0 / data.spacing.maxCoeff());
     for (factor_ = 2; factor_ < most && CoarseBytes() > 0.5 * settings.bytes; ++factor_) {
     }
-    if (CoarseBytes() > settings.bytes)
-      throw Error(Error::Kind::TooLarge, "embedding by slabs needs " + Gigabytes(CoarseBytes()) +
-                                             " to look at all of the volume, and " + Gigabytes(settings.bytes) + " are allowed");
     const auto& n = data.dimensions;
-    const double sliceBytes = static_cast<double>(n[0]) * n[1] * (sizeof(T) + 1.0);
+    const double sliceBytes = static_cast<double>(SliceSize()) * (sizeof(T) + 1.0);
     slicesAtATime_ = std::clamp(static_cast<int>(0.1 * settings.bytes / sliceBytes), 1, std::min(64, n[2]));
+    const double looking = CoarseBytes() + InputBytes();
+    if (looking > settings.bytes)
+      throw Error(Error::Kind::TooLarge, "embedding by slabs needs " + Gigabytes(looking) +
+                                             " to look at all of the volume, and " + Gigabytes(settings.bytes) + " are allowed");
     coarse_ = data;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       coarse_.dimensions[axis] = (n[axis] + factor_ - 1) / factor_;
@@ -224,12 +225,14 @@ private:
     return EmbedMemory(settings_.embed, grid) + static_cast<double>(grid.VoxelCount()) * (2.0 * sizeof(T) + 4.0);
   }
 
-  // What making a slab takes: slices of the data, and once more those that are taken (they are the input's as well), the slab, a
-  // brick, and the sums and statistics of blocks.
+  // What the input holds of the slices that are looked at, or taken: voxels, its own region, and ours of it.
+  double InputBytes() const { return static_cast<double>(SliceSize()) * slicesAtATime_ * (sizeof(T) + 2.0); }
+
+  // What making a slab takes: slices of the data, those of the input, the slab, a brick, and the sums and statistics of blocks.
   double SlabBytes(int slices) const
   {
     const auto& n = grid_.dimensions;
-    const double held = std::min(data_.dimensions[2], slices + Halo(2) + (reach_ + 2) * blocks_.size[2]) + 2.0 * slicesAtATime_;
+    const double held = std::min(data_.dimensions[2], slices + Halo(2) + (reach_ + 2) * blocks_.size[2] + slicesAtATime_);
     double brick = 1.0;
     for (std::size_t axis = 0; axis < 3; ++axis)
       brick *= std::min(n[axis], (axis < 2 ? brickEdge : slices) + 2 * Halo(axis));
@@ -239,7 +242,7 @@ private:
     const double levels = std::min(static_cast<double>(grid_.VoxelCount()), 1.0 * settings_.embed.diffusionVoxels);
     // Noise and weights are floats; form, valid region, labels and masks a byte each. Of sums and statistics there are three of
     // either, of three numbers. Made noise is held along its beams, in some 16 million samples at most.
-    return static_cast<double>(SliceSize()) * held * (sizeof(T) + 1.0) +
+    return static_cast<double>(SliceSize()) * held * (sizeof(T) + 1.0) + InputBytes() +
            static_cast<double>(n[0]) * n[1] * slices * (sizeof(T) + 2.0) + std::max(brick * (sizeof(T) + 14.0), ahead) +
            6.0 * 24.0 * blocks + 32.0 * levels + 0.3e9;
   }
