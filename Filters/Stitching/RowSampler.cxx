@@ -48,7 +48,7 @@ struct Corners {
 };
 
 template <class A>
-[[gnu::always_inline]] inline void PlaceVoxels(const double* start, const double* step, int first, int count, Places<A>& places)
+void Place(const double* start, const double* step, int first, int count, Places<A>& places)
 {
   for (int axis = 0; axis < 3; ++axis)
     for (int l = 0; l < count; ++l) {
@@ -60,7 +60,7 @@ template <class A>
 }
 
 template <class T, class A>
-[[gnu::always_inline]] inline void MixCorners(const Corners<T>& corners, const Places<A>& places, int count, A* __restrict values)
+void Mix(const Corners<T>& corners, const Places<A>& places, int count, A* __restrict values)
 {
   for (int l = 0; l < count; ++l) {
     const A tx = places.fraction[0][l], ty = places.fraction[1][l], tz = places.fraction[2][l];
@@ -72,25 +72,9 @@ template <class T, class A>
   }
 }
 
-// One text for all kinds of numbers.
-#define EchoramaMix(T, A)                                                                                                        \
-  void Mix(const Corners<T>& corners, const Places<A>& places, int count, A* values)                                             \
-  {                                                                                                                              \
-    MixCorners(corners, places, count, values);                                                                                  \
-  }
-#define EchoramaChunk(A)                                                                                                         \
-  void Place(const double* start, const double* step, int first, int count, Places<A>& places)                                   \
-  {                                                                                                                              \
-    PlaceVoxels(start, step, first, count, places);                                                                              \
-  }                                                                                                                              \
-  EchoramaMix(unsigned char, A) EchoramaMix(short, A) EchoramaMix(unsigned short, A) EchoramaMix(float, A) EchoramaMix(double, A)
-EchoramaChunk(float) EchoramaChunk(double)
-#undef EchoramaChunk
-#undef EchoramaMix
-
-    // The mask of a volume; empty where it leaves out nothing.
-    template <class T>
-    VolumeView<const unsigned char> MaskOf(const PosedVolume<T>& volume)
+// The mask of a volume; empty where it leaves out nothing.
+template <class T>
+VolumeView<const unsigned char> MaskOf(const PosedVolume<T>& volume)
 {
   const auto& valid = volume.valid;
   if (!valid.Empty() && !std::memchr(valid.Data(), 0, static_cast<std::size_t>(valid.Size())))

@@ -21,8 +21,7 @@ template <class A>
 }
 
 template <class A>
-[[gnu::always_inline]] inline bool MixRows(const A* a, const A* b, const A* c, const A* d, A y, A z, const unsigned char* wanted,
-                                           int count, A* __restrict to)
+bool Mix(const A* a, const A* b, const A* c, const A* d, A y, A z, const unsigned char* wanted, int count, A* __restrict to)
 {
   int wrong = 0;
   for (int i = 0; i < count; ++i) {
@@ -33,20 +32,14 @@ template <class A>
   return (wrong & 1) == 0;
 }
 
-#define EchoramaRows(A)                                                                                                          \
-  void Stretch(const float* padded, const int* offsets, const A* fractions, int size, int blocks, A* to)                         \
-  {                                                                                                                              \
-    if (size == 2) /* known, so that it becomes vector instructions */                                                           \
-      StretchRow(padded, offsets, fractions, 2, blocks, to);                                                                     \
-    else                                                                                                                         \
-      StretchRow(padded, offsets, fractions, size, blocks, to);                                                                  \
-  }                                                                                                                              \
-  bool Mix(const A* a, const A* b, const A* c, const A* d, A y, A z, const unsigned char* wanted, int count, A* to)              \
-  {                                                                                                                              \
-    return MixRows(a, b, c, d, y, z, wanted, count, to);                                                                         \
-  }
-EchoramaRows(float) EchoramaRows(double)
-#undef EchoramaRows
+template <class A>
+void Stretch(const float* padded, const int* offsets, const A* fractions, int size, int blocks, A* to)
+{
+  if (size == 2) // known, so that it becomes vector instructions
+    StretchRow(padded, offsets, fractions, 2, blocks, to);
+  else
+    StretchRow(padded, offsets, fractions, size, blocks, to);
+}
 
 } // namespace
 
