@@ -2,6 +2,7 @@
 // echorama align: where do overlapping volumes belong?
 #include "Commands.h"
 #include "Core/Base/Angles.h"
+#include "Core/Base/Memory.h"
 #include "Displacements.h"
 #include "Filters/Calibration/ItkTransform.h"
 #include "Filters/Registration/AlignmentJson.h"
@@ -81,12 +82,11 @@ void GiveLandmarks(const std::vector<LandmarkList>& lists, const std::vector<Loa
 void TellPlan(Session& session, std::size_t volumes, const AlignVolumesPlan& plan)
 {
   session.result["plan"] = ToJson(plan, 1);
-  const auto gb = [](double bytes) { return Fixed(1e-9 * bytes, 3) + " GB"; };
   session.Say(std::to_string(volumes) + " volumes, " + std::to_string(plan.pairs.size()) + " pairs, " +
               std::to_string(plan.pairsFinishedBefore) + " of them finished before");
-  session.Say("memory beside the volumes themselves: " + gb(plan.bytesOfAll) + " for all, " + gb(plan.bytesPerVolume) +
-              " for one; " + gb(plan.budgetBytes) + " may be used, so volumes are prepared " +
-              std::to_string(plan.timesPrepared) + " times");
+  session.Say("memory beside the volumes themselves: " + GigabytesText(plan.bytesOfAll) + " for all, " +
+              GigabytesText(plan.bytesPerVolume) + " for one; " + GigabytesText(plan.budgetBytes) +
+              " may be used, so volumes are prepared " + std::to_string(plan.timesPrepared) + " times");
   session.Say("time: some " + Fixed(plan.seconds, 0) + " s (" + Fixed(plan.secondsPerPair, 2) + " s for a pair, " +
               Fixed(plan.secondsPerVolume, 2) + " s to prepare a volume), and more for pairs that are tried again");
 }

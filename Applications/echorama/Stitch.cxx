@@ -3,6 +3,7 @@
 // slab by slab.
 #include "Commands.h"
 #include "Core/Base/FormatText.h"
+#include "Core/Base/Memory.h"
 #include "Displacements.h"
 #include "Filters/Stitching/StitchJson.h"
 #include "ParameterOptions.h"
@@ -51,11 +52,6 @@ void AddReliability(Session& session, std::vector<LoadedVolume>& volumes)
   }
 }
 
-std::string Gigabytes(double bytes)
-{
-  return Fixed(bytes * 1e-9, bytes < 1e9 ? 3 : 1) + " GB";
-}
-
 std::string VoxelsText(const ImageGeometry& grid)
 {
   return SizeText(grid.dimensions) + " voxels of " + Triple(grid.spacing, " x ", 3) + " mm";
@@ -64,10 +60,10 @@ std::string VoxelsText(const ImageGeometry& grid)
 void TellCost(Session& session, const StitchCost& cost, const std::string& output)
 {
   session.Say(VoxelsText(cost.grid));
-  session.Say("  the result needs " + Gigabytes(cost.outputBytes) + ", what is known of the overlaps " +
-              Gigabytes(cost.planBytes) +
+  session.Say("  the result needs " + GigabytesText(cost.outputBytes) + ", what is known of the overlaps " +
+              GigabytesText(cost.planBytes) +
               (cost.planFactor > 1 ? " (on a grid that is " + std::to_string(cost.planFactor) + " times coarser)" : "") +
-              "; allowed are " + Gigabytes(cost.allowedBytes) + " beside the volumes");
+              "; allowed are " + GigabytesText(cost.allowedBytes) + " beside the volumes");
   session.Say(cost.slabs == 0   ? "  that does not fit"
               : cost.slabs == 1 ? "  that fits as a whole"
               : IsWrittenBySlabs(output)
@@ -161,8 +157,8 @@ void Stitch(Session& session, StitchOptions options, vtkUltrasoundStitcher* stit
       session.Note("--quality: it needs the whole result in memory, and is left out");
   } else {
     if (slabs > 1)
-      throw Error(Error::Kind::TooLarge, options.output + ": the result needs " + Gigabytes(cost.outputBytes) +
-                                             " beside what is known of the overlaps, and " + Gigabytes(cost.allowedBytes) +
+      throw Error(Error::Kind::TooLarge, options.output + ": the result needs " + GigabytesText(cost.outputBytes) +
+                                             " beside what is known of the overlaps, and " + GigabytesText(cost.allowedBytes) +
                                              " are allowed (--memory). Its format is written whole; as .mha, .nrrd or .nii it "
                                              "would be made in " +
                                              std::to_string(slabs) + " slabs");

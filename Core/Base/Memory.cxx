@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Memory.h"
+#include "Core/Base/FormatText.h"
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -50,6 +51,11 @@ double FreeMemory(const std::string& root)
 {
   const double all = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE)) / 1024.0;
   return std::min(1024.0 * NumberIn(fs::path(root) / "proc/meminfo", "MemAvailable:", all), LeftByGroups(root));
+}
+
+std::string GigabytesText(double bytes)
+{
+  return Format(bytes < 999.5e9 ? "%.3g GB" : "%.0f GB", 1e-9 * bytes);
 }
 
 } // namespace echorama

@@ -9,4 +9,7 @@ namespace echorama {
 /// \param root where /proc and /sys lie
 double FreeMemory(const std::string& root = "/");
 
+/// Three digits of \a bytes, in 10^9 bytes, for messages: "0.749 GB".
+std::string GigabytesText(double bytes);
+
 } // namespace echorama

@@ -56,5 +56,14 @@ TEST(FreeMemory, OfThisMachineIsSomethingButNotAll)
   EXPECT_LT(FreeMemory(), 1e15);
 }
 
+TEST(GigabytesText, HasThreeDigitsOrAllBeforeThePoint)
+{
+  EXPECT_EQ(GigabytesText(0.0), "0 GB");
+  EXPECT_EQ(GigabytesText(748.6e6), "0.749 GB");
+  EXPECT_EQ(GigabytesText(12e9), "12 GB");
+  EXPECT_EQ(GigabytesText(999.6e9), "1000 GB");
+  EXPECT_EQ(GigabytesText(12345e9), "12345 GB");
+}
+
 } // namespace
 } // namespace echorama

@@ -7,6 +7,7 @@
 #include "EmbedSlabs.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/FormatText.h"
+#include "Core/Base/Memory.h"
 #include "Core/Base/Parallel.h"
 #include "Core/Imaging/ScanConversion.h"
 #include "Core/Imaging/VoxelTypes.h"
@@ -29,11 +30,6 @@ constexpr int grainEdge = 160;   // of the brick on which the grain is measured
 constexpr int leastSlices = 8;   // of a slab
 constexpr int mostSlices = 256;
 
-std::string Gigabytes(double bytes)
-{
-  return Format("%.2f GB", bytes / 1e9);
-}
-
 template <class T>
 class SlabsOf : public EmbedSlabs {
 public:
@@ -54,8 +50,9 @@ public:
     slicesAtATime_ = std::clamp(static_cast<int>(0.1 * settings.bytes / sliceBytes), 1, std::min(64, n[2]));
     const double looking = CoarseBytes() + InputBytes();
     if (looking > settings.bytes)
-      throw Error(Error::Kind::TooLarge, "embedding by slabs needs " + Gigabytes(looking) +
-                                             " to look at all of the volume, and " + Gigabytes(settings.bytes) + " are allowed");
+      throw Error(Error::Kind::TooLarge, "embedding by slabs needs " + GigabytesText(looking) +
+                                             " to look at all of the volume, and " + GigabytesText(settings.bytes) +
+                                             " are allowed");
     coarse_ = data;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       coarse_.dimensions[axis] = (n[axis] + factor_ - 1) / factor_;
@@ -133,8 +130,8 @@ public:
     while (slices > leastSlices && SlabBytes(slices) > settings_.bytes)
       slices = std::max(leastSlices, slices * 3 / 4);
     if (SlabBytes(slices) > settings_.bytes)
-      throw Error(Error::Kind::TooLarge, "embedding by slabs needs " + Gigabytes(SlabBytes(slices)) + " on a grid of " +
-                                             SizeText(grid_.dimensions) + " voxels, and " + Gigabytes(settings_.bytes) +
+      throw Error(Error::Kind::TooLarge, "embedding by slabs needs " + GigabytesText(SlabBytes(slices)) + " on a grid of " +
+                                             SizeText(grid_.dimensions) + " voxels, and " + GigabytesText(settings_.bytes) +
                                              " are allowed");
     slabs_ = (grid_.dimensions[2] + slices - 1) / slices;
     FindLevels(grid, progress.Part(0.4, 1.0));

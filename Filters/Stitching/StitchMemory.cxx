@@ -4,6 +4,7 @@
 #include "StitchMemory.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/FormatText.h"
+#include "Core/Base/Memory.h"
 #include "RowSampler.h"
 #include "StitchGrid.h"
 #include <algorithm>
@@ -20,11 +21,6 @@ constexpr double membraneBytes = 32.0;
 
 // Bytes per row of the grid: where its counts, its overlap and the pieces of that begin.
 constexpr double rowBytes = 24.0;
-
-std::string Gigabytes(double bytes)
-{
-  return Format(bytes < 1e8 ? "%.3g GB" : "%.1f GB", bytes * 1e-9);
-}
 
 double AllowedMemory(const StitchParameters& parameters)
 {
@@ -119,7 +115,7 @@ void CheckStitch(const StitchParameters& parameters, const std::vector<ImageGeom
   }
   throw Error(Error::Kind::TooLarge,
               "stitching " + std::to_string(volumes.size()) + " volumes onto " + SizeText(grid.dimensions) + " voxels needs " +
-                  Gigabytes(needed) + ", more than the " + Gigabytes(cost.allowedBytes) + " allowed (MaximumMemoryGb); " +
+                  GigabytesText(needed) + ", more than the " + GigabytesText(cost.allowedBytes) + " allowed (MaximumMemoryGb); " +
                   (cost.slabs > 1 ? "written in " + std::to_string(cost.slabs) + " slabs it fits, or " : "") +
                   Format("SpacingMm = %.2g would fit", spacing));
 }
