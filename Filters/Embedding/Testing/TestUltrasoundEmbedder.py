@@ -226,7 +226,7 @@ for number, source in enumerate((None, reader)):
         filter.SetInputData(long)
     filter.SetFeatherMm(2)
     assert not filter.IsLargerThanMemory()
-    filter.SetMaximumMemoryGb(0.38)
+    filter.SetMaximumMemoryGb(0.385)
     assert filter.IsLargerThanMemory()
     filter.UpdateInformation()
     slabs = filter.GetSlabs()
