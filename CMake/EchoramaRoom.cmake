@@ -180,7 +180,7 @@ macro(_echorama_add_tests name)
 endmacro()
 
 # One program per decoder that reads what it should not trust. As a test it runs for ECHORAMA_FUZZ_SECONDS, from the files
-# that Fuzzing/Seeds<Name>.py, if there is one, writes to the folder it is given.
+# that Fuzzing/Seeds<Name>.py writes to the folder it is given and from the inputs in Fuzzing/Corpus<Name>.zip.
 macro(_echorama_add_fuzzers name)
   file(GLOB fuzzers CONFIGURE_DEPENDS Fuzzing/Fuzz*.cxx)
   # clang takes a precompiled header only with the sanitizers that it was made with.
@@ -193,15 +193,14 @@ macro(_echorama_add_fuzzers name)
   endif()
   foreach(fuzzer IN LISTS fuzzers)
     get_filename_component(target ${fuzzer} NAME_WE)
-    string(REPLACE "Fuzz" "Seeds" seeds ${target})
     add_executable(${target} EXCLUDE_FROM_ALL ${fuzzer})
     add_dependencies(tests ${target})
     target_link_libraries(${target} PRIVATE Echorama::${name}Kernels)
     target_link_options(${target} PRIVATE -fsanitize=fuzzer)
     echorama_compile_options(${target})
     set_target_properties(${target} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/fuzzers)
-    add_test(NAME Fuzz.${target} COMMAND ${PROJECT_SOURCE_DIR}/Testing/fuzz.sh $<TARGET_FILE:${target}>
-      ${CMAKE_CURRENT_SOURCE_DIR}/Fuzzing/${seeds}.py ${ECHORAMA_FUZZ_SECONDS})
+    add_test(NAME Fuzz.${target} COMMAND ${PROJECT_SOURCE_DIR}/Testing/fuzz.py $<TARGET_FILE:${target}> ${fuzzer}
+      ${ECHORAMA_FUZZ_SECONDS})
     set_tests_properties(Fuzz.${target} PROPERTIES LABELS fuzz TIMEOUT 300)
   endforeach()
 endmacro()

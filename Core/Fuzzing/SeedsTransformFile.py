@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""SeedsTransformFile.py DIR: named transforms in both formats, whole and wrong in one place, and Plus's own device sets
-where the data lie beside the project, for the fuzzer to start from."""
+"""SeedsTransformFile.py DIR: named transforms in both formats, whole and wrong in one place, for the fuzzer to
+start from."""
 import json
-import shutil
 import sys
 from pathlib import Path
 
@@ -36,5 +35,3 @@ seeds = {
 }
 for name, content in seeds.items():
     (folder / name).write_text(content)
-for real in (Path(__file__).resolve().parents[2] / "../shared/data/plus").glob("*.xml"):
-    shutil.copy(real, folder)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""SeedsKretz.py DIR: small GE Kretz files, whole and broken in one place, and the head of a real one where there is one."""
+"""SeedsKretz.py DIR: small GE Kretz files, whole and broken in one place."""
 import struct
 import sys
 from pathlib import Path
@@ -32,8 +32,5 @@ seeds = {
     "cut": kretz()[:-20],
     "fine": kretz(resolution=1e-7),
 }
-real = Path(__file__).resolve().parents[2] / ".." / "shared" / "data" / "kretz" / "sphere_phantom.vol"
-if real.exists():
-    seeds["real"] = real.read_bytes()[:60000]
 for name, content in seeds.items():
     (folder / name).write_bytes(content)

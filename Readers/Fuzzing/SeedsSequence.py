@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""SeedsSequence.py DIR: small sequences of each kind, whole and broken, for the fuzzer to start from; and the headers of the
-real recordings beside the project, where they are there."""
+"""SeedsSequence.py DIR: small sequences of each kind, whole and broken, for the fuzzer to start from."""
 import sys
 import zlib
 from pathlib import Path
@@ -46,9 +45,3 @@ seeds = {
 }
 for name, content in seeds.items():
     (folder / name).write_bytes(content)
-real = Path(__file__).resolve().parents[2].parent / "shared" / "data"
-for path in sorted(real.glob("*/*.igs.mha")):
-    content = path.read_bytes()
-    begin = content.index(b"ElementDataFile = LOCAL\n") + 24
-    header = content[:begin].split(b"\n")
-    (folder / path.name).write_bytes(b"\n".join(header[:60] + header[-2:]) + content[begin:begin + 2000])
