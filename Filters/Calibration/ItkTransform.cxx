@@ -2,6 +2,7 @@
 // elastix' transforms are those of ITK under other names, so both formats come down to a type, its parameters and its fixed
 // parameters. The type is looked at as soon as it is read: the numbers of a B-spline may fill a line of many megabytes.
 #include "Filters/Calibration/ItkTransform.h"
+#include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/TextFile.h"
 #include "Readers/HeaderLines.h"
