@@ -10,6 +10,7 @@ make them, and the run is added to the fuzzer's row in Testing/fuzzed.csv.
 import argparse
 import csv
 import datetime
+import fcntl
 import pathlib
 import re
 import resource
@@ -74,7 +75,7 @@ def pack(fuzzer, seeds, inputs, archive):
         subprocess.run([fuzzer, *LIMITS, "-merge=1", merged, *inputs], check=True, stderr=subprocess.DEVNULL)
         new = sorted((path for path in pathlib.Path(merged).iterdir() if path.name not in known), key=lambda path: path.stat().st_size)
         while True:
-            with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as packed:
+            with zipfile.ZipFile(archive, "w") as packed:
                 for path in sorted(new):
                     packed.writestr(zipfile.ZipInfo(path.name), path.read_bytes(), zipfile.ZIP_DEFLATED, 9)
             if archive.stat().st_size <= LARGEST_ARCHIVE:
@@ -84,7 +85,13 @@ def pack(fuzzer, seeds, inputs, archive):
 
 
 def record(name, run, cpu):
-    """Adds a run to the row of its fuzzer."""
+    """Adds a run to the row of its fuzzer. Several fuzzers may run beside each other."""
+    with open(__file__, "rb") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        add_to_row(name, run, cpu)
+
+
+def add_to_row(name, run, cpu):
     rows = {}
     if TABLE.exists():
         with open(TABLE, newline="") as file:
