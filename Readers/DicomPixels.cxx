@@ -4,8 +4,8 @@
 // this one.
 #include "Readers/DicomPixels.h"
 #include "Core/Base/Error.h"
+#include "Core/Sharing/IsolatedTask.h"
 #include "Readers/DicomElements.h"
-#include "Readers/IsolatedTask.h"
 #include <fstream>
 #include <gdcmImage.h>
 #include <gdcmSequenceOfFragments.h>

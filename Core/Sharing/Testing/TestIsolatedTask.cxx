@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "Readers/IsolatedTask.h"
+#include "Core/Sharing/IsolatedTask.h"
 #include "Testing/Sanitized.h"
 #include <chrono>
 #include <cstdlib>
