@@ -86,6 +86,12 @@ std::string NewFileBeside(const fs::path& target)
 
 } // namespace
 
+std::string NewFolderBeside(const std::string& path)
+{
+  RemoveAbandoned(path, "part");
+  return NameBeside(path, "part");
+}
+
 FileReplacement::~FileReplacement()
 {
   std::error_code ignored;

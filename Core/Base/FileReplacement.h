@@ -5,6 +5,10 @@
 
 namespace echorama {
 
+/// A name beside \a path that nobody else uses, for a folder that is renamed to it when it is whole. What killed processes left
+/// under such names goes.
+std::string NewFolderBeside(const std::string& path);
+
 /// Files that take their places all together, or not at all.
 ///
 /// Each is written under a temporary name in the folder where it belongs. Commit() renames them; without it (an error, a

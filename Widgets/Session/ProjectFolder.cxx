@@ -3,6 +3,7 @@
 // absolute paths beside the relative ones: until then the folder is volumes without a project, which no one mistakes for one.
 #include "Widgets/Session/ProjectFolder.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/FileReplacement.h"
 #include "Core/Geometry/PoseFile.h"
 #include "Readers/OutputFiles.h"
 #include "Widgets/Session/ProjectVolumes.h"
@@ -79,10 +80,9 @@ std::vector<Copy> CopiesOf(const SessionVolume& volume, std::set<fs::path>& take
 // Removes what was begun, unless it is finished.
 class Stage {
 public:
-  explicit Stage(const fs::path& place) : path(place.parent_path() / ("." + place.filename().string() + ".part"))
+  explicit Stage(const fs::path& place) : path(NewFolderBeside(place.string()))
   {
     std::error_code problem;
-    fs::remove_all(path, problem);
     fs::create_directories(path / "volumes", problem);
     if (problem)
       Refuse(Error::Kind::FileSystem, place, "it cannot be made (" + problem.message() + ")");

@@ -145,6 +145,28 @@ TEST_F(CopiedProject, HoldsVolumesThatAreInNoFileWrittenIntoIt)
     EXPECT_TRUE(entry.path().filename() == "data" || entry.path().filename() == "copy") << entry.path();
 }
 
+TEST_F(CopiedProject, OfTwoAtOnceNoneIsMissingFiles)
+{
+  const Project project = Some();
+  const std::string place = (root / "copy").string();
+  int told = 0;
+  const Progress progress([&](double) { // a second one begins, and is stopped
+    if (++told == 3) {
+      EXPECT_THROW(CopyProject(project, place, Progress([](double) { return false; })), Error);
+    }
+    return true;
+  });
+  CopyProject(project, place, progress);
+  EXPECT_GE(told, 3);
+  const std::string other = CopyProject(project, (root / "other").string());
+  std::vector<std::string> expected = FilesIn(root / "other"), files = FilesIn(root / "copy");
+  const auto isProject = [](const std::string& file) { return file.find('/') == std::string::npos; };
+  expected.erase(std::remove_if(expected.begin(), expected.end(), isProject), expected.end());
+  files.erase(std::remove_if(files.begin(), files.end(), isProject), files.end());
+  EXPECT_EQ(files, expected);
+  EXPECT_GT(files.size(), 5u);
+}
+
 TEST_F(CopiedProject, IsRefusedWithTheReasonAndNothingIsLeft)
 {
   const Project project = Some();
