@@ -106,8 +106,8 @@ struct StreamRecorder::Parts {
     try {
       while (!signal.Stopped())
         Step(StepSeconds);
-      while (Step(0.0)) {
-      }
+      Step(0.0); // what came until then; a source that goes on must not keep it from ending
+      CloseFrame();
       recorder.Finish();
     } catch (const Error& problem) {
       End(problem);

@@ -3,6 +3,7 @@
 #include "Readers/PoseLog.h"
 #include "Testing/TemporaryFolder.h"
 #include "Tracking/Stream/StreamRecorder.h"
+#include <atomic>
 #include <chrono>
 #include <functional>
 #include <thread>
@@ -110,6 +111,32 @@ TEST_F(StreamRecorderTest, NamesThatCannotBeRecordedAreLeftOut)
   EXPECT_EQ(state.leftOut, 100u);
   EXPECT_NE(state.lastLeftOut.find("BToTracker"), std::string::npos) << state.lastLeftOut;
   EXPECT_EQ(ReadPoseLog(Path("a.igs.mha")).poses.size(), 40u);
+}
+
+TEST_F(StreamRecorderTest, StopsWhileTheSourceGoesOn)
+{
+  PoseStream stream;
+  StreamRecorder recorder(Path("a.igs.mha"), stream.Subscribe());
+  std::atomic<bool> goesOn{true};
+  std::thread source([&] { // faster than poses are written
+    Random random(2);
+    const ToolPose pose = RandomPose(random, "ProbeToTracker", 0.0);
+    for (double time = 0.0; goesOn; time += 0.001) {
+      ToolPose next = pose;
+      next.time = time;
+      stream.Add(next);
+    }
+  });
+  EXPECT_TRUE(WaitFor([&] { return recorder.State().frames > 100; }));
+  std::atomic<bool> hasStopped{false};
+  std::thread stops([&] {
+    recorder.Stop();
+    hasStopped = true;
+  });
+  EXPECT_TRUE(WaitFor([&] { return hasStopped.load(); }));
+  goesOn = false;
+  stops.join();
+  source.join();
 }
 
 TEST_F(StreamRecorderTest, NothingCame)

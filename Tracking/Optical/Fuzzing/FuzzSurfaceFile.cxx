@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Any bytes as a calibrated surface: JSON, a byte 0, and the mesh beside it. "CHECKSUM" in the JSON becomes that of the mesh, which
-// nobody guesses. What is accepted is asked where pixels are.
+// Any bytes as a calibrated surface: JSON, a byte 0, and the mesh beside it. "CHECKSUM" in the JSON becomes that of the mesh,
+// which nobody guesses. What is accepted is asked where pixels are.
 #include "Core/Base/Checksum.h"
 #include "Testing/Fuzzing.h"
 #include "Tracking/Optical/SurfaceFile.h"
