@@ -12,6 +12,9 @@ namespace echorama {
 
 std::ifstream OpenToRead(const std::string& path)
 {
+  std::error_code none;
+  if (std::filesystem::exists(path, none) && !std::filesystem::is_regular_file(path, none)) // a pipe would not even open
+    throw Error(Error::Kind::FileSystem, path + ": it is not a plain file");
   std::ifstream stream(path, std::ios::binary);
   if (!stream)
     throw Error(Error::Kind::FileSystem, path + ": it cannot be opened (is reading permitted?)");

@@ -98,7 +98,11 @@ public:
     if (first.samples == 3)
       Note("Its colours have become luminance.");
     if (first.photometric == "MONOCHROME1")
-      Note("Its grey levels were stored inverted (MONOCHROME1) and are turned back.");
+      Note(content_.type == VoxelType::Float32
+               ? "Small values are meant to be shown bright (MONOCHROME1): its values are kept as they are."
+               : "Its grey levels were stored inverted (MONOCHROME1) and are turned back.");
+    if (first.holdsMovieGroup)
+      Note("Beside these pictures " + MovieGroup() + ".");
   }
 
   void Read(std::size_t index, void* voxels, unsigned char*, const Progress& progress) override
@@ -449,7 +453,7 @@ private:
   void Convert(const DicomHeader& file, const DicomPicture& picture, const char* pixels, char* out) const
   {
     const std::size_t columns = static_cast<std::size_t>(file.columns), count = columns * static_cast<std::size_t>(file.rows);
-    const bool floats = content_.type == VoxelType::Float32, inverted = file.photometric == "MONOCHROME1";
+    const bool floats = content_.type == VoxelType::Float32, inverted = !floats && file.photometric == "MONOCHROME1";
     const bool halved = file.storage != DicomStorage::Encapsulated && file.photometric == "YBR_FULL_422";
     const int spare = file.bitsAllocated - file.bitsStored;
     const std::int64_t highest = file.isSigned ? -1 : (std::int64_t{1} << file.bitsStored) - 1;

@@ -13,9 +13,9 @@ std::string FirstBytes(const std::string& path)
 {
   std::string bytes(1 << 16, '\0');
   std::error_code none;
-  std::ifstream stream(path, std::ios::binary);
-  if (!std::filesystem::is_regular_file(path, none) || !stream)
+  if (!std::filesystem::is_regular_file(path, none)) // a pipe would not even open
     return {};
+  std::ifstream stream(path, std::ios::binary);
   stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   bytes.resize(static_cast<std::size_t>(stream.gcount()));
   return bytes;

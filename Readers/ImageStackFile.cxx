@@ -198,6 +198,14 @@ void ImageStack::CollectPages(std::string path) // a copy: the slices are made a
     slices_.push_back({path, PictureKind::Tiff, page});
   if (slices_.empty())
     FailFile(path, "it holds thumbnails alone");
+  // OME's images are those of all channels and times, in any order.
+  const std::string_view size = "SizeZ=\"";
+  if (const std::size_t at = description_.find(size); description_.find("<OME") != std::string::npos && at != std::string::npos) {
+    const std::string text = description_.substr(at + size.size(), description_.find('"', at + size.size()) - at - size.size());
+    if (std::size_t count = 0; ParseNumber(text, count) && count < slices_.size())
+      FailFile(path, "OME says that it has " + text + " slices, and there are " + std::to_string(slices_.size()) +
+                         " images: several channels or times of a volume; one is needed");
+  }
   if (description_.compare(0, 7, "ImageJ=") != 0)
     description_.clear();
   std::uint64_t images = 0;
@@ -337,7 +345,7 @@ void ToGrey(const T* pixels, std::size_t count, const PictureInfo& info, T* grey
       grey[i] = Luminance(pixels);
     if constexpr (std::is_integral_v<T>)
       if (info.inverted)
-        grey[i] = static_cast<T>(std::numeric_limits<T>::max() - grey[i]);
+        grey[i] = static_cast<T>(~grey[i]); // the highest for the lowest
   }
 }
 

@@ -388,9 +388,17 @@ void NiftiSource::ReadComment(const std::string& text)
     content_.geometry = exact;
   else
     Note("another program has changed the geometry since Echorama wrote it: the new one was taken");
+  std::string left;
   while (std::getline(lines, line))
-    if (const std::size_t equals = line.find('='); equals != std::string::npos)
-      content_.fields.emplace_back(line.substr(0, equals), line.substr(equals + 1));
+    if (const std::size_t equals = line.find('='); equals != std::string::npos) {
+      const std::string key = line.substr(0, equals);
+      if (!agrees && (key == "Echorama_ProbeToWorld" || key == "Echorama_ImageToWorld")) // true of the geometry of before
+        left += (left.empty() ? "" : " and ") + key.substr(key.find('_') + 1);
+      else
+        content_.fields.emplace_back(key, line.substr(equals + 1));
+    }
+  if (!left.empty())
+    Note(left + " belonged to the geometry of before, and was left out");
 }
 
 PlainOrGzip& NiftiSource::Data()

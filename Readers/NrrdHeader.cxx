@@ -4,6 +4,7 @@
 // are channels or time. Field names may be written with or without blanks, so blanks are dropped before comparing.
 #include "Core/Base/Error.h"
 #include "Core/Base/Words.h"
+#include "Readers/DataFile.h"
 #include "Readers/HeaderLines.h"
 #include "Readers/ImageHeader.h"
 #include <algorithm>
@@ -295,6 +296,9 @@ private:
   void ParseSpacings(std::size_t all, const std::vector<std::size_t>& axes)
   {
     ImageGeometry& g = header_.geometry;
+    for (const auto& [field, name] : {std::pair{"space", "space"}, std::pair{"spaceorigin", "space origin"}})
+      if (Find(field))
+        lines_.Fail(std::string("it has \"") + name + "\" without \"space directions\": where its axes point is not known");
     header_.notes.push_back("the file has no direction: its axes were taken as those of the world");
     Eigen::Vector3d unit = Eigen::Vector3d::Ones();
     if (const std::string* text = Find("units")) {
@@ -366,7 +370,7 @@ private:
 
     if (const std::string* text = Find("lineskip")) {
       const int skip = lines_.Sizes("line skip", *text, 1)[0];
-      std::ifstream stream(header_.dataPath, std::ios::binary);
+      std::ifstream stream = OpenToRead(header_.dataPath);
       stream.seekg(header_.dataOffset);
       for (int line = 0; line < skip && stream; ++line)
         stream.ignore(std::numeric_limits<std::streamsize>::max(), '\n');

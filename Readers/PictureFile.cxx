@@ -162,9 +162,9 @@ TiffPointer OpenTiff(const std::string& path, PictureInfo* info)
 }
 
 template <class T>
-T TiffTag(TIFF* tiff, std::uint32_t tag)
+T TiffTag(TIFF* tiff, std::uint32_t tag, T otherwise = {})
 {
-  T value{};
+  T value = otherwise;
   TIFFGetFieldDefaulted(tiff, tag, &value);
   return value;
 }
@@ -180,7 +180,8 @@ bool ReadTiffPage(TIFF* tiff, PictureInfo* info)
   info->height = TiffTag<std::uint32_t>(tiff, TIFFTAG_IMAGELENGTH);
   const int bits = TiffTag<std::uint16_t>(tiff, TIFFTAG_BITSPERSAMPLE),
             format = TiffTag<std::uint16_t>(tiff, TIFFTAG_SAMPLEFORMAT),
-            photometric = TiffTag<std::uint16_t>(tiff, TIFFTAG_PHOTOMETRIC),
+            photometric = TiffTag<std::uint16_t>(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK),
+            orientation = TiffTag<std::uint16_t>(tiff, TIFFTAG_ORIENTATION, ORIENTATION_TOPLEFT),
             compression = TiffTag<std::uint16_t>(tiff, TIFFTAG_COMPRESSION);
   info->channels = TiffTag<std::uint16_t>(tiff, TIFFTAG_SAMPLESPERPIXEL);
   if (info->channels < 1 || info->channels > 4)
@@ -189,6 +190,8 @@ bool ReadTiffPage(TIFF* tiff, PictureInfo* info)
     return refuse("its %d colours are stored apart, which is not supported", info->channels);
   if (bits != 8 && bits != 16 && bits != 32)
     return refuse("it has %d bits per number; 8, 16 and 32 are read", bits);
+  if (orientation != ORIENTATION_TOPLEFT)
+    return refuse("it does not begin at its top left (orientation %d): turned or mirrored pictures are not read", orientation);
   info->isFloat = format == SAMPLEFORMAT_IEEEFP;
   info->isSigned = format == SAMPLEFORMAT_INT;
   if ((info->isFloat && bits != 32) || format > SAMPLEFORMAT_VOID)
@@ -197,7 +200,7 @@ bool ReadTiffPage(TIFF* tiff, PictureInfo* info)
     TIFFSetField(tiff, TIFFTAG_JPEGCOLORMODE, JPEGCOLORMODE_RGB);
   else if (photometric != PHOTOMETRIC_MINISBLACK && photometric != PHOTOMETRIC_MINISWHITE && photometric != PHOTOMETRIC_RGB)
     return refuse("its colours are stored in a way that is not supported (photometric interpretation %d)", photometric);
-  info->inverted = photometric == PHOTOMETRIC_MINISWHITE;
+  info->inverted = photometric == PHOTOMETRIC_MINISWHITE && !info->isFloat; // floats have no largest number
   info->bytes = bits / 8;
   const int unit = TiffTag<std::uint16_t>(tiff, TIFFTAG_RESOLUTIONUNIT);
   const double perMm = unit == RESUNIT_INCH ? 1.0 / 25.4 : unit == RESUNIT_CENTIMETER ? 0.1 : 0.0;

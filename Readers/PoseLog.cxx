@@ -69,6 +69,7 @@ struct Columns {
   bool pairs = false; // rows are those of pairs of poses
   int time = -1, tool = -1, status = -1;
   std::array<int, 4> clock{-1, -1, -1, -1}; // hour, minutes, seconds, ms
+  std::string repeated;                     // a column that is there several times, so that it belongs to nobody knows which tool
   std::vector<Sensor> sensors;
 
   bool HasClock() const { return clock[0] >= 0 && clock[1] >= 0 && clock[2] >= 0; }
@@ -145,7 +146,11 @@ std::optional<Columns> NamedColumns(const std::string& line)
   std::set<std::string> known;
   for (const std::string& name : names) {
     const std::string begin = name.substr(0, 2), end = name.size() > 2 ? name.substr(2) : "";
-    if ((begin != "qw" && begin != "qo" && begin != "q0") || !known.insert(end).second)
+    if (begin != "qw" && begin != "qo" && begin != "q0")
+      continue;
+    if (std::count(names.begin(), names.end(), name) > 1)
+      columns.repeated = name;
+    if (!known.insert(end).second)
       continue;
     const Sensor sensor{SensorName(end),
                         {find({"tx" + end, "x" + end}), find({"ty" + end, "y" + end}), find({"tz" + end, "z" + end}),
@@ -219,6 +224,9 @@ private:
       NoteDate(before);
       if (const auto columns = NamedColumns(line_)) {
         columns_ = *columns;
+        if (!columns_.repeated.empty())
+          lines_.FailHere("the column \"" + columns_.repeated + "\" is there several times: number the columns of each tool (" +
+                          columns_.repeated + "1, " + columns_.repeated + "2, and so on), or export one tool at a time");
         if (columns_.time < 0 && !columns_.HasClock() && options_.rowsPerSecond == 0.0)
           lines_.FailHere("no column holds the time (time, timestamp, t; or hour, minutes, seconds and ms)");
         if (columns_.tool < 0)

@@ -95,10 +95,12 @@ vtkSmartPointer<vtkDataArray> ReadCompanion(const std::string& path, const char*
   return values;
 }
 
-// Which volume of a time series is the one for a time: the last that is not later.
+// Which volume of a time series is the one for a time: the last that is not later, but for rounding. Times of files are sums
+// of steps that are rounded, some to floats.
 std::size_t IndexOfTime(const std::vector<double>& times, double time)
 {
-  const auto later = std::upper_bound(times.begin(), times.end(), time);
+  const double rounding = 1e-3 * (times.back() - times.front()) / static_cast<double>(times.size());
+  const auto later = std::upper_bound(times.begin(), times.end(), time + rounding);
   return later == times.begin() ? 0 : static_cast<std::size_t>(later - times.begin()) - 1;
 }
 

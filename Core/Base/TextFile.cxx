@@ -10,8 +10,9 @@ namespace echorama {
 std::string ReadTextFile(const std::string& path, std::size_t limit)
 {
   std::error_code error;
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream || !std::filesystem::is_regular_file(path, error))
+  const bool isPlain = std::filesystem::is_regular_file(path, error); // a pipe would not even open
+  std::ifstream stream(isPlain ? path : std::string(), std::ios::binary);
+  if (!stream)
     throw Error(Error::Kind::FileSystem, path + ": the file cannot be read");
   // The size is measured by reading: files of the system say 0.
   std::string text;

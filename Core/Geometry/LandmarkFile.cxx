@@ -174,7 +174,14 @@ std::vector<Landmark> TableLandmarks(std::string_view text, const JsonPlace& fil
       }
       continue;
     }
-    const std::vector<std::string> cells = Cells(line, place);
+    std::vector<std::string> cells = Cells(line, place);
+    if (isFcsv && cells.size() == columns.count + 2) { // 3D Slicer 5 adds two that it does not name: the status and "automatic"
+      const std::string status = cells[columns.count], automatic = cells[columns.count + 1];
+      const bool isStatus = status.size() == 1 && status[0] >= '0' && status[0] <= '3' && (automatic == "0" || automatic == "1");
+      if (isStatus && status != "2") // undefined, previewed or missing
+        continue;
+      cells.resize(columns.count + (isStatus ? 0 : 2));
+    }
     if (mayBeNames) {
       mayBeNames = false;
       double x = 0.0;

@@ -88,6 +88,21 @@ TEST_F(LandmarkFile, FiducialsInBothFrames)
            {1, 2, 3});
 }
 
+TEST_F(LandmarkFile, Slicer5AddsTwoCellsThatItDoesNotName)
+{
+  const auto row = [](const std::string& label, const std::string& end) {
+    return "1,22.5,31.25,-4,0,0,0,1,1,1,0," + label + ",,," + end + "\n";
+  };
+  const std::string head = Fcsv.substr(0, Fcsv.find("vtkMRML"));
+  const std::vector<Landmark> landmarks =
+      Read(head + row("defined", "2,0") + row("undefined", "0,0") + row("missing", "3,1") + row("last", "2,1"));
+  ASSERT_EQ(landmarks.size(), 2u);
+  ExpectIs(landmarks[0], "defined", {22.5, 31.25, -4});
+  EXPECT_EQ(landmarks[1].label, "last");
+  Refused(head + row("a", "5,0"), "it has 16 cells"); // two decimal commas
+  Refused(head + row("a", "2,25"), "it has 16 cells");
+}
+
 TEST_F(LandmarkFile, BadFiducials)
 {
   Refused(Replaced(Fcsv, "LPS", "2"), "line 2: the coordinate system is \"2\"; 0 (RAS) or 1 (LPS) is needed, not voxel indices");

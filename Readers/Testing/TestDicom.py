@@ -363,6 +363,9 @@ class Dicom(unittest.TestCase):
         data.add_new(0x7FE10010, "LO", "GEMS_Ultrasound_MovieGroup_001")
         data.add_new(0x7FE11001, "OB", b"1234")
         self.refused(data, "GEMS_Ultrasound_MovieGroup_001")
+        pixels(data, VOXELS[0])  # the picture that stands for it
+        data.PixelSpacing = ["0.47", "0.31"]
+        self.assertIn("GEMS_Ultrasound_MovieGroup_001", self.read(data).notes)
 
     def test_types_of_numbers(self):
         for kind, bits in ((np.int8, 8), (np.uint16, 16), (np.int16, 16), (np.uint16, 12), (np.int16, 12), (np.int32, 32)):
@@ -391,6 +394,14 @@ class Dicom(unittest.TestCase):
         reading = Reading(self.folder / "rescaled")
         self.expect(reading, (VOXELS * 0.5 + np.arange(5)[:, None, None]).astype(np.float32), tolerance=1e-7)
         self.assertIn("slope", reading.notes)
+        for k in range(5):  # that is how values are shown, and they stay what they are
+            data = slice_of(k)
+            data.RescaleSlope = "0.5"
+            data.PhotometricInterpretation, data.RescaleIntercept = "MONOCHROME1", str(k)
+            self.save(data, f"both/{k}.dcm")
+        reading = Reading(self.folder / "both")
+        self.expect(reading, (VOXELS * 0.5 + np.arange(5)[:, None, None]).astype(np.float32), tolerance=1e-7)
+        self.assertIn("MONOCHROME1", reading.notes)
 
     def test_colours(self):
         colours = np.stack([VOXELS, VOXELS[::-1], 255 - VOXELS], axis=-1)

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Headers as other programs write them, and headers that lie.
+#include "Readers/FileKind.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/Testing/ObliqueVolume.h"
 #include "Readers/VolumeFile.h"
 #include "Testing/TemporaryFolder.h"
 #include <clocale>
 #include <map>
+#include <sys/stat.h>
 
 using namespace echorama;
 using namespace echorama::testing;
@@ -183,6 +185,26 @@ TEST_F(ImageHeaderTest, NrrdUnitsSpacingsAndCells)
     EXPECT_EQ(unknown.geometry.spacing, nodes.geometry.spacing);
     EXPECT_EQ(unknown.notes.size(), 2u) << units;
   }
+}
+
+TEST_F(ImageHeaderTest, ASpaceWithoutDirectionsIsRefused)
+{
+  const Fields plain{{"space directions", ""}, {"spacings", "0.25 0.5 2"}};
+  for (const char* other : {"space", "space origin"}) {
+    Fields fields = plain;
+    fields[other] = "";
+    Refused("s.nrrd", Nrrd(fields), "without \"space directions\"");
+  }
+}
+
+TEST_F(ImageHeaderTest, APipeIsNotWaitedFor)
+{
+  const std::string path = Path("pipe.mha");
+  ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
+  ExpectRefused([&] { FormatOfContent(path); }, Error::Kind::FileSystem, path, "not a plain file");
+  EXPECT_EQ(KindOf(path), FileKind::Volume);
+  const std::string header = Put("a.nhdr", Nrrd({{"data file", "pipe.mha"}, {"line skip", "1"}}));
+  ExpectRefused([&] { ReadImageHeader(header); }, Error::Kind::FileSystem, path, "not a plain file");
 }
 
 TEST_F(ImageHeaderTest, LeftHandedAxesAreTakenInReverse)

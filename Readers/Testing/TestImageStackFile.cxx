@@ -29,7 +29,7 @@ std::vector<T> Pattern(int width, int height, int channels = 1, int seed = 0)
 
 struct Tiff {
   int width = 5, height = 4, channels = 1, bits = 8, format = SAMPLEFORMAT_UINT, compression = COMPRESSION_NONE;
-  int photometric = PHOTOMETRIC_MINISBLACK, tile = 0, unit = RESUNIT_NONE;
+  int photometric = PHOTOMETRIC_MINISBLACK, tile = 0, unit = RESUNIT_NONE, orientation = ORIENTATION_TOPLEFT;
   double resolution = 0.0;
   std::string description;
 };
@@ -99,7 +99,9 @@ protected:
       TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, t.channels);
       TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, t.bits);
       TIFFSetField(tiff, TIFFTAG_SAMPLEFORMAT, t.format);
-      TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, t.photometric);
+      if (t.photometric >= 0)
+        TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, t.photometric);
+      TIFFSetField(tiff, TIFFTAG_ORIENTATION, t.orientation);
       TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
       TIFFSetField(tiff, TIFFTAG_COMPRESSION, t.compression);
       if (t.resolution > 0.0) {
@@ -243,6 +245,19 @@ TEST_F(ImageStackFile, EveryTypeOfImage)
   const auto turned = OpenImageStack(WriteTiff<unsigned char>("a.tif", {eight}, t));
   EXPECT_EQ(Read<unsigned char>(*turned)[7], 255 - eight[7]);
   EXPECT_TRUE(HasNote(turned->Content(), "white"));
+  t.format = SAMPLEFORMAT_INT; // the lowest becomes the highest
+  const auto turnedSigned = Read<signed char>(*OpenImageStack(WriteTiff<unsigned char>("a.tif", {eight}, t)));
+  for (std::size_t i = 0; i < eight.size(); ++i)
+    EXPECT_EQ(turnedSigned[i], -1 - static_cast<signed char>(eight[i]));
+  t.format = SAMPLEFORMAT_IEEEFP;
+  t.bits = 32;
+  const auto same = OpenImageStack(WriteTiff<float>("a.tif", {floats}, t));
+  EXPECT_EQ(Read<float>(*same), floats);
+  EXPECT_FALSE(HasNote(same->Content(), "white"));
+  t.format = SAMPLEFORMAT_UINT;
+  t.bits = 8;
+  t.photometric = -1; // it does not say
+  EXPECT_EQ(Read<unsigned char>(*OpenImageStack(WriteTiff<unsigned char>("a.tif", {eight}, t))), eight);
 
   // JPEG loses: a smooth picture comes back within two grey levels.
   std::vector<unsigned char> smooth(360);
@@ -340,6 +355,20 @@ TEST_F(ImageStackFile, ATiffOfSeveralPagesIsAStackByItself)
   EXPECT_EQ(OpenImageStack(three)->Content().geometry.dimensions[2], 3);
 }
 
+TEST_F(ImageStackFile, ChannelsAndTimesOfOmeAreNoSlices)
+{
+  const auto page = Pattern<unsigned char>(5, 4);
+  Tiff t;
+  const auto write = [&](const std::string& sizes) {
+    t.description = "<?xml version=\"1.0\"?><OME><Image><Pixels DimensionOrder=\"XYCZT\" SizeX=\"5\" SizeY=\"4\" " + sizes +
+                    "/></Image></OME>";
+    return WriteTiff<unsigned char>("a.ome.tif", {page, page, page, page}, t);
+  };
+  EXPECT_EQ(OpenImageStack(write("SizeZ=\"4\" SizeC=\"1\" SizeT=\"1\""))->Content().geometry.dimensions[2], 4);
+  Refused(write("SizeZ=\"2\" SizeC=\"2\" SizeT=\"1\""), "has 2 slices, and there are 4 images: several channels or times");
+  Refused(write("SizeZ=\"2\" SizeC=\"1\" SizeT=\"2\""), "several channels or times");
+}
+
 TEST_F(ImageStackFile, BadImagesAreNamed)
 {
   const auto good = [this](const std::string& name) { return Png(name, Pattern<unsigned char>(40, 30), 40, 30); };
@@ -393,6 +422,9 @@ TEST_F(ImageStackFile, WhatIsNoStackIsRefused)
   t.photometric = PHOTOMETRIC_CIELAB;
   t.channels = 3;
   Refused(WriteTiff<unsigned char>("a.tif", {Pattern<unsigned char>(5, 4, 3)}, t), "photometric");
+  t = Tiff();
+  t.orientation = ORIENTATION_BOTLEFT;
+  Refused(WriteTiff<unsigned char>("a.tif", {Pattern<unsigned char>(5, 4)}, t), "(orientation 4)");
 
   // Sizes out of all proportion: the width in the header of a PNG, with its checksum.
   std::string png = Bytes(Png("a.png", Pattern<unsigned char>(5, 4), 5, 4));

@@ -120,6 +120,17 @@ class Nifti(unittest.TestCase):
             reader.UpdateTimeStep(steps[step])
             self.assert_same(reader.GetOutput(), voxels[..., step], affine(6), 1e-4)
 
+    def test_a_time_may_be_rounded(self):
+        voxels = values(np.uint8, dims + (4,))
+        image = nibabel.Nifti1Image(voxels, affine(6))
+        image.header.set_xyzt_units("mm", "sec")
+        image.header["pixdim"][4] = 0.2  # a float, which is more
+        nibabel.save(image, self.path("t.nii"))
+        reader = self.read("t.nii")
+        for time, step in ((0.4, 2), (0.2, 1), (0.399, 1), (0.6000001, 3), (0.0, 0)):
+            reader.UpdateTimeStep(time)
+            self.assert_same(reader.GetOutput(), voxels[..., step], affine(6), 1e-4)
+
     def test_nibabel_reads_what_we_write(self):
         for name in ["a.nii", "a.nii.gz"]:
             for dtype in [np.uint8, np.int16, np.float32, np.float64]:
@@ -145,6 +156,15 @@ class Nifti(unittest.TestCase):
 
     def test_what_nibabel_changes_stays_changed(self):
         self.test_nibabel_reads_what_we_write()
+        image = self.read("a.nii").GetOutput()
+        pose = numpy_to_vtk(np.eye(4).ravel(), deep=True)
+        pose.SetName("ProbeToWorld")
+        image.GetFieldData().AddArray(pose)
+        writer = vtkUltrasoundWriter()
+        writer.SetInputData(image)
+        writer.SetFileName(self.path("a.nii"))
+        self.assertEqual(writer.Write(), 1)
+        self.assertTrue(self.read("a.nii").GetOutput().GetFieldData().HasArray("ProbeToWorld"))
         theirs = nibabel.load(self.path("a.nii"))
         moved = theirs.affine.copy()
         moved[:3, 3] += [5, 0, 0]
@@ -152,6 +172,8 @@ class Nifti(unittest.TestCase):
         reader = self.read("moved.nii")
         self.assertAlmostEqual(reader.GetOutput().GetOrigin()[0], -4, places=5)
         self.assertIn("another program", reader.GetNotes())
+        self.assertFalse(reader.GetOutput().GetFieldData().HasArray("ProbeToWorld"))  # it did not move with the volume
+        self.assertIn("ProbeToWorld", reader.GetNotes())
 
 
 if __name__ == "__main__":

@@ -194,6 +194,8 @@ TEST_F(PoseLogFile, Refused)
   Refused("1,2,3\n", "not a log of poses");
   Refused("t,x,y,z,qx,qy,qz\n1,2,3,4,5,6,7\n", "not a log of poses");
   Refused("x,y,z,qw,qx,qy,qz\n1,2,3,4,5,6,7\n", ", line 1: no column holds the time");
+  Refused("time,Q0,Qx,Qy,Qz,Tx,Ty,Tz,Port 2,Q0,Qx,Qy,Qz,Tx,Ty,Tz\n1,1,0,0,0,1,2,3,2,1,0,0,0,4,5,6\n",
+          ", line 1: the column \"q0\" is there several times");
   Refused(Head, "it holds no poses");
   Refused(Head + "1,Probe,one,2,3,1,0,0,0,OK\n", ", line 2: \"one\" is not a number");
   Refused(Head + "1,\"Probe,1,2,3,1,0,0,0,OK\n", ", line 2: a quotation mark is not closed");
