@@ -99,9 +99,12 @@ vtkSmartPointer<vtkDataArray> ReadCompanion(const std::string& path, const char*
 // of steps that are rounded, some to floats.
 std::size_t IndexOfTime(const std::vector<double>& times, double time)
 {
-  const double rounding = 1e-3 * (times.back() - times.front()) / static_cast<double>(times.size());
-  const auto later = std::upper_bound(times.begin(), times.end(), time + rounding);
-  return later == times.begin() ? 0 : static_cast<std::size_t>(later - times.begin()) - 1;
+  const auto later = std::upper_bound(times.begin(), times.end(), time);
+  if (later == times.begin()) {
+    return 0;
+  }
+  const bool isRounded = later != times.end() && *later - time < 1e-3 * (*later - *(later - 1));
+  return static_cast<std::size_t>(later - times.begin()) - (isRounded ? 0 : 1);
 }
 
 // Which volume is asked for, and its time.
