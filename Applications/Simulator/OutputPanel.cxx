@@ -68,7 +68,7 @@ OutputPanel::OutputPanel(Scan* scan, QWidget* parent)
   form->addRow(tr("State"), state_);
   connect(scan, &Scan::FrameMade, this, &OutputPanel::Take);
   connect(scan, &Scan::SubjectChanged, this, &OutputPanel::Finish); // a recording is of one body
-  connect(scan, &Scan::SubjectChanged, this, [this] { delete replaying_; });
+  connect(scan, &Scan::SubjectChanged, this, &OutputPanel::EndReplay);
   auto* timer = new QTimer(this); // a probe that rests makes no frames
   connect(timer, &QTimer::timeout, this, [this] {
     if (recorder_)
@@ -134,11 +134,13 @@ QString OutputPanel::End()
   return path;
 }
 
-void OutputPanel::Finish()
+bool OutputPanel::Finish()
 {
+  if (!recorder_)
+    return true;
   const QString path = End();
   if (path.isEmpty())
-    return;
+    return false;
   const auto joined = std::make_shared<QString>();
   Job* job = Job::Start(
       this, tr("Putting the recording into one file"),
@@ -150,6 +152,7 @@ void OutputPanel::Finish()
     emit scan_->Said({Message::Note, tr("Recorded as %1").arg(done ? *joined : path), {}});
   });
   emit JobStarted(job);
+  return true;
 }
 
 void OutputPanel::SendOrNot(bool send)
@@ -202,11 +205,16 @@ void OutputPanel::ShowState()
     state_->setText(text);
 }
 
+void OutputPanel::EndReplay()
+{
+  delete replaying_;
+}
+
 void OutputPanel::ForbidReplay(bool forbidden)
 {
   replay_->setDisabled(forbidden);
   if (forbidden)
-    delete replaying_;
+    EndReplay();
 }
 
 void OutputPanel::Begin(Job* job)

@@ -30,13 +30,16 @@ public:
 
   void SetFolder(const QDir& folder) { folder_ = folder; }
   bool IsRecording() const { return recorder_ != nullptr; }
-  /// Ends what is being recorded, and puts it into one file in the background.
-  void Finish();
+  /// Ends what is being recorded, and puts it into one file in the background. \returns false when there is none of what was
+  /// recorded, and has said why.
+  bool Finish();
   /// Shows a recorded scan in place of the last seconds, frozen. Both, reading it and comparing its images with those that are
   /// made now, are done in the background; then it tells how many are the same.
   void Replay(const QString& path);
   /// While somebody is looking for what a recording may show.
   void ForbidReplay(bool forbidden);
+  /// What it has read and compared by then stays.
+  void EndReplay();
   vtkUltrasoundOpenIGTLinkSender* Sender() { return sender_; }
 
 signals:

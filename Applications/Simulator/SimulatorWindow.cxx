@@ -496,22 +496,11 @@ bool SimulatorWindow::AsksBeforeClosing()
   if (!messages_->Texts().contains(text)) // it is asked already
     messages_->Show({Message::Question, text, {{tr("Stay"), {}}, {tr("End it and close"), [this] {
                                                                     tasks_->GiveUp();
-                                                                    outputs_->ForbidReplay(true);
-                                                                    outputs_->Finish();
-                                                                    connect(jobs_, &JobBar::CountChanged, this,
-                                                                            &SimulatorWindow::CloseWhenDone,
-                                                                            Qt::UniqueConnection);
-                                                                    CloseWhenDone(jobs_->Count());
+                                                                    outputs_->EndReplay();
+                                                                    if (outputs_->Finish())
+                                                                      jobs_->WhenDone([this] { close(); });
                                                                   }}}});
   return true;
-}
-
-void SimulatorWindow::CloseWhenDone(int running)
-{
-  if (running > 0)
-    return;
-  disconnect(jobs_, &JobBar::CountChanged, this, &SimulatorWindow::CloseWhenDone);
-  QTimer::singleShot(0, this, &QWidget::close); // the job that ended is not quite gone
 }
 
 void SimulatorWindow::closeEvent(QCloseEvent* event)

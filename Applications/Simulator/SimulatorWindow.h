@@ -53,7 +53,6 @@ private:
   void MakeImageMenu(QMenu* menu);
   void AddPanel(QWidget* panel, const QString& title);
   bool AsksBeforeClosing();
-  void CloseWhenDone(int running);
   void ShowSolution(const PlanePicture* picture);
   void ShowFrame();
   void ShowState();

@@ -51,13 +51,30 @@ void JobBar::Watch(Job* job)
     stop->setEnabled(false);
     label->setText(tr("Stopping: %1").arg(job->Label()));
   });
+  connect(job, &Job::Ended, this, [this, job](bool done) {
+    if (!done && !job->IsCancelled())
+      whenDone_ = {};
+  });
   connect(job, &QObject::destroyed, this, [this, row, later] {
     later->stop();
     row->hide(); // at once: it goes when Qt gets to it, and whoever drags then would see everything jump
     row->deleteLater();
     jobs_.removeAll(nullptr);
     emit CountChanged(--count_);
+    GoOn();
   });
+}
+
+void JobBar::WhenDone(std::function<void()> then)
+{
+  whenDone_ = std::move(then);
+  GoOn();
+}
+
+void JobBar::GoOn()
+{
+  if (count_ == 0 && whenDone_)
+    QTimer::singleShot(0, this, std::exchange(whenDone_, {})); // the job that ended is not quite gone
 }
 
 QStringList JobBar::Labels() const

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Job.h"
+#include <functional>
 #include <QPointer>
 #include <QStringList>
 #include <QVector>
@@ -20,12 +21,17 @@ public:
   int Count() const { return count_; }
   QStringList Labels() const;
   void StopAll();
+  /// Calls \a then when nothing runs any more; not if something fails before that, as what it says would go unread.
+  void WhenDone(std::function<void()> then);
 
 signals:
   void CountChanged(int count);
 
 private:
+  void GoOn();
+
   int count_ = 0;
+  std::function<void()> whenDone_;
   QVector<QPointer<Job>> jobs_;
 };
 

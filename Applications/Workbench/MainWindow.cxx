@@ -374,12 +374,7 @@ void MainWindow::Say(const Message& message)
 bool MainWindow::AsksBeforeClosing()
 {
   if (jobs_->Count() > 0) {
-    const auto closeThen = [this] {
-      if (jobs_->Count() == 0)
-        close();
-      else
-        connect(jobs_, &JobBar::CountChanged, this, &MainWindow::CloseWhenDone, Qt::UniqueConnection);
-    };
+    const auto closeThen = [this] { jobs_->WhenDone([this] { close(); }); };
     bench_->Ask(tr("%1 is still running.").arg(jobs_->Labels().join(", ")),
                 {{tr("Stay"), {}},
                  {tr("Close when it is done"), closeThen},
@@ -399,14 +394,6 @@ bool MainWindow::AsksBeforeClosing()
     mayClose_ = false; // it may have stayed
   });
   return true;
-}
-
-void MainWindow::CloseWhenDone(int running)
-{
-  if (running > 0)
-    return;
-  disconnect(jobs_, &JobBar::CountChanged, this, &MainWindow::CloseWhenDone);
-  QTimer::singleShot(0, this, &QWidget::close); // the job that ended is not quite gone
 }
 
 // All that is on the tool bar is seen, in a second row when texts are large or the window is narrow.

@@ -67,7 +67,6 @@ private:
   void ShowEmpty();
   void OpenSample(const Sample& sample);
   bool AsksBeforeClosing();
-  void CloseWhenDone(int running);
   void RestoreLayout();
   void FitToolBars();
 

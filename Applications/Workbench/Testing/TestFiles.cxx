@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Where keys go after real clicks; and opening, leaving and coming back to work. No test here gives the focus to anything by
 // itself.
+#include "Core/Base/Error.h"
 #include "Core/Base/Memory.h"
 #include "FileActions.h"
 #include "Job.h"
@@ -10,7 +11,9 @@
 #include "vtkUltrasoundSliceView.h"
 #include "WindowUnderTest.h"
 #include "Workbench.h"
+#include <atomic>
 #include <cmath>
+#include <memory>
 #include <QApplication>
 #include <QComboBox>
 #include <QDockWidget>
@@ -292,23 +295,43 @@ void TestFiles::closingWaitsForWorkThatRuns()
 {
   WindowUnderTest window;
   QVERIFY(window.Open({A()}));
-  const auto start = [&window] {
+  const auto goesOn = std::make_shared<std::atomic<bool>>(true);
+  const auto start = [&window, goesOn](bool fails) {
+    *goesOn = true;
     window.Window().Jobs()->Watch(Job::Start(
         &window.Window(), "Something long",
-        [](const Progress& progress) {
-          for (int i = 0; i < 3000; i++) {
+        [goesOn, fails](const Progress& progress) {
+          while (*goesOn) {
             progress(0.5);
             QThread::msleep(10);
           }
+          if (fails)
+            throw Error(Error::Kind::FileSystem, "the disk is full");
         },
-        [] {}, [](const QString&) {}));
+        [] {}, [&window](const QString& error) { window.Window().Bench()->Warn(error); }));
   };
-  start();
+  start(true);
   window.Window().close();
   QVERIFY(window.Window().isVisible() && window.HasMessage("Something long is still running"));
   window.Screenshot("closing-while-running");
   QVERIFY(window.Answer("Stay"));
   QVERIFY(window.Window().isVisible() && window.Messages().isEmpty());
+  // What fails meanwhile is read before the window goes.
+  window.Window().close();
+  QVERIFY(window.Answer("Close when it is done"));
+  *goesOn = false;
+  QVERIFY(window.Wait());
+  window.Settle();
+  QVERIFY(window.Window().isVisible() && window.HasMessage("the disk is full"));
+  start(false);
+  window.Window().close();
+  QVERIFY(window.Answer("Close when it is done"));
+  window.Settle();
+  QVERIFY(window.Window().isVisible());
+  *goesOn = false;
+  QTRY_VERIFY(!window.Window().isVisible());
+  window.Window().show();
+  start(true);
   window.Window().close();
   QVERIFY(window.Answer("Stop it and close"));
   QTRY_VERIFY(!window.Window().isVisible());
