@@ -104,6 +104,8 @@ void FileActions::Open(const QStringList& paths)
                      .arg(QFileInfo(projects.first()).fileName()));
   // One after the other: a project takes the place of what is there, and poses are for volumes that are there.
   const auto readPoses = [this, poses] {
+    if (poses.isEmpty() || !bench_->MayHelp(tr("Read poses")))
+      return;
     for (const QString& path : poses)
       bench_->Try("poses", [this, path] { return bench_->Session()->ReadPoses(path.toUtf8().constData()); },
                   {{tr("Read another file..."), [this] { readPoses_->trigger(); }}});

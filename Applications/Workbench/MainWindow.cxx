@@ -207,7 +207,7 @@ void MainWindow::MakePanels()
       ->addAction(MakeAction(this, "compareAction", tr("&Compare with sources"), "T",
                              tr("Show the result alone, and then its sources instead, in all views"),
                              [result] { result->Compare(); }));
-  training_ = new TrainingPanel(bench_, this);
+  training_ = new TrainingPanel(bench_, jobs_, this);
   AddPanel(training_, tr("Train"));
   auto* score = new QLabel(this);
   score->setObjectName("scoreReadout");

@@ -5,6 +5,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
 #include "Core/Geometry/RigidTransform.h"
+#include "JobBar.h"
 #include "Widgets/Session/LiveScore.h"
 #include "Workbench.h"
 #include <cmath>
@@ -44,7 +45,7 @@ QString TimeText(double seconds)
 
 } // namespace
 
-TrainingPanel::TrainingPanel(Workbench* bench, QWidget* parent) : QWidget(parent), bench_(bench)
+TrainingPanel::TrainingPanel(Workbench* bench, const JobBar* jobs, QWidget* parent) : QWidget(parent), bench_(bench), jobs_(jobs)
 {
   setObjectName("trainingPanel");
   auto* layout = new QVBoxLayout(this);
@@ -231,6 +232,11 @@ void TrainingPanel::Scatter()
 
 void TrainingPanel::StartOrGiveUp()
 {
+  if (!isTraining_ && jobs_->Count() > 0) { // what it finds would help, and is not counted
+    bench_->Warn(tr("Start: %1 is still running; wait for it, or stop it").arg(jobs_->Labels().join(", ")), {}, objectName());
+    return;
+  }
+  bench_->Forget(objectName());
   if (!isTraining_) {
     bench_->Session()->ForgetHistory(); // undo would lead to the solution
     startScore_ = bench_->Session()->GetScore();

@@ -13,6 +13,7 @@ class QTimer;
 
 namespace echorama {
 
+class JobBar;
 class Workbench;
 
 /// Evaluation and training (dissertation 4.4). With a truth loaded the score is shown while volumes move, with the errors as
@@ -22,7 +23,7 @@ class TrainingPanel : public QWidget {
   Q_OBJECT
 
 public:
-  explicit TrainingPanel(Workbench* bench, QWidget* parent = nullptr);
+  TrainingPanel(Workbench* bench, const JobBar* jobs, QWidget* parent = nullptr);
 
   /// The pose file of the truth; a failure goes to the message bar.
   bool LoadTruth(const QString& path);
@@ -46,6 +47,7 @@ private:
   void WarnOfHistory(const QString& why);
 
   Workbench* bench_;
+  const JobBar* jobs_;
   QLabel *truth_, *score_, *time_;
   QCheckBox *live_, *vectors_, *help_;
   QLineEdit *trainee_, *history_;

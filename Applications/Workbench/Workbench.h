@@ -102,6 +102,9 @@ public:
   ///@{ An attempt that is scored: nothing that leads to the solution is shown, and help is refused, or counted.
   void BeginAttempt(bool isHelpAllowed);
   void EndAttempt();
+  /// Whether \a what, which places volumes or tells where they belong, may be done: no attempt is scored, or it may and is
+  /// counted. Else it has said why not.
+  bool MayHelp(const QString& what);
   bool IsScored() const { return isScored_; }
   int HelpTaken() const { return helpTaken_; } ///< in this attempt or the last one
   ///@}
@@ -143,7 +146,6 @@ private:
   void Tell(const SliceLook&) { emit LookChanged(); }
   void Tell(const VolumeLook&) { emit LookChanged(); }
   void Tell(const Handling&) { emit HandChanged(); }
-  bool MayHelp(const QString& what);
   void OnSessionEvent(vtkObject* session, unsigned long event, void* data);
 
   Workspace& workspace_;

@@ -2506,6 +2506,10 @@ mm</translation>
         <source>Show error arrows</source>
         <translation>Fehlerpfeile zeigen</translation>
     </message>
+    <message>
+        <source>Start: %1 is still running; wait for it, or stop it</source>
+        <translation>Beginnen: %1 läuft noch; warten Sie darauf, oder brechen Sie es ab</translation>
+    </message>
 </context>
 <context>
     <name>echorama::ViewActions</name>

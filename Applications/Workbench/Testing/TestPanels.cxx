@@ -2,6 +2,7 @@
 // What the panels at the right do: alignment, stitching, export, training, trackers. With the pair of a liver it makes the
 // pictures of the manual, and holds them against those in Documentation/pictures (ECHORAMA_UPDATE_PICTURES=1 replaces these).
 #include "ExportActions.h"
+#include "FileActions.h"
 #include "Job.h"
 #include "JobBar.h"
 #include "RegistrationPanel.h"
@@ -594,6 +595,10 @@ void TestPanels::trainingHidesScoreAndKeepsAttempts()
   QTest::mouseClick(window.Part<QPushButton>("refine"), Qt::LeftButton);
   QVERIFY(window.Part<QPushButton>("refine")->isEnabled()); // nothing runs
   QVERIFY2(window.HasMessage("not during an attempt"), qPrintable(window.Messages().join('\n')));
+  const auto moved = window.Pose(2);
+  window.Window().Files()->Open({truth}); // nor a file of poses
+  window.Settle();
+  QCOMPARE(window.Pose(2), moved);
   QTest::qWait(300);
   QTest::mouseClick(window.Part<QPushButton>("trainingSubmit"), Qt::LeftButton);
   QVERIFY(!panel->IsTraining());
@@ -616,6 +621,18 @@ void TestPanels::trainingHidesScoreAndKeepsAttempts()
   QVERIFY(window.Wait());
   QTest::mouseClick(window.Part<QPushButton>("trainingSubmit"), Qt::LeftButton);
   QCOMPARE(ReadAttempts(Folder().filePath("attempts.csv").toStdString()).at(1).help, 1);
+  // Nor is it to be had by asking for it before.
+  QTest::mouseClick(window.Part<QPushButton>("refine"), Qt::LeftButton);
+  QTest::mouseClick(window.Part<QPushButton>("trainingStart"), Qt::LeftButton);
+  QVERIFY(!panel->IsTraining());
+  QVERIFY2(window.HasMessage("still running"), qPrintable(window.Messages().join('\n')));
+  QVERIFY(window.Wait());
+  QTest::mouseClick(window.Part<QPushButton>("trainingStart"), Qt::LeftButton);
+  QVERIFY(panel->IsTraining() && !window.HasMessage("still running"));
+  window.Window().Files()->Open({truth});
+  window.Settle();
+  QTest::mouseClick(window.Part<QPushButton>("trainingSubmit"), Qt::LeftButton);
+  QCOMPARE(ReadAttempts(Folder().filePath("attempts.csv").toStdString()).at(2).help, 1);
   // A file that is something else is refused, and stays.
   QVERIFY(!panel->SetHistory(truth));
   QVERIFY(QFile(truth).size() > 0);
