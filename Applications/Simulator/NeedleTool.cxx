@@ -48,6 +48,10 @@ NeedleTool::NeedleTool(Scan* scan) : QObject(scan), scan_(scan)
     if (isShown_ && guide_ != NeedleGuide::None && !isFollowing_ &&
         (!(scan_->Scanner().Probe() == guided_) || heldBy_.matrix() != scan_->ProbeToWorld().matrix()))
       Give(); // another probe has another end; or bone could not be asked for while the image was made
+    if (isFollowing_ && !isBoneKnown_) {
+      FindBone();
+      emit Changed();
+    }
   });
   connect(scan, &Scan::ControlsChanged, this, [this] {
     isBoneKnown_ = hasSaidWhy_ = false; // what stops it may be another
@@ -281,21 +285,30 @@ void NeedleTool::Follow(const Eigen::Matrix4d& matrix)
     return; // the tracker's own state says what it sends
   }
   const bool isSame = needle.tip == entry_ && needle.direction == direction_;
-  if (isSame && isFollowing_ && isShown_ && !isLost_ && isBoneKnown_)
+  if (isSame && isFollowing_ && isShown_ && !isLost_ && (isBoneKnown_ || scan_->IsMaking()))
     return;
-  isFollowing_ = isShown_ = isBoneKnown_ = true;
-  isLost_ = hasMetBone_ = false;
+  hasMetBone_ = hasMetBone_ && isFollowing_;
+  isFollowing_ = isShown_ = true;
+  isLost_ = isBoneKnown_ = false;
   entry_ = needle.tip;
   direction_ = needle.direction;
   depthMm_ = 0.0;
-  try {                                                       // nobody can stop a hand: it is told, and counted
-    const double way = std::max(InsideOf(needle), 0.0) + 1.0; // the tip may be beyond bone
-    hasMetBone_ =
-        scan_->Scanner().AdvanceNeedle({needle.tip - way * needle.direction, needle.direction}, way, SweepMm) < way - 1e-3;
+  if (!scan_->IsMaking()) // else with the next image
+    FindBone();
+  Give();
+}
+
+// Nobody can stop a hand: that a tracked one meets bone is told, and counted.
+void NeedleTool::FindBone()
+{
+  isBoneKnown_ = true;
+  hasMetBone_ = false;
+  try {
+    const double way = std::max(InsideOf({entry_, direction_}), 0.0) + 1.0; // the tip may be beyond bone
+    hasMetBone_ = scan_->Scanner().AdvanceNeedle({entry_ - way * direction_, direction_}, way, SweepMm) < way - 1e-3;
   } catch (const Error& error) {
     SayWhyBoneIsNotKnown(error);
   }
-  Give();
 }
 
 void NeedleTool::SetLost()

@@ -77,6 +77,7 @@ private:
   bool IsFree(const Eigen::Vector3d& place);
   void ToGuide();
   void SlideBack();
+  void FindBone();
   double InsideOf(const Needle& needle) const;
   void SayWhyBoneIsNotKnown(const Error& error);
   double AimMm() const;

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string_view>
 #include <utility>
 #include <vtkPolyData.h>
 
@@ -61,6 +62,8 @@ void Scan::SetSubject(Subject subject)
   cine_.Clear();
   cineIndex_ = -1;
   number_ = 0;
+  frame_ = {};
+  picture_ = {};
   failure_.clear();
   badPose_.clear();
   walk_ = subject_.mesh ? std::make_unique<SkinWalk>(subject_.mesh) : nullptr;
@@ -89,7 +92,7 @@ void Scan::SetPressed(std::vector<vtkSmartPointer<vtkImageData>> states)
 // The tissue follows the face: how deep that is below the skin is how far it is pressed, up to the deepest state.
 void Scan::PressTissue()
 {
-  if (subject_.pressed.empty())
+  if (subject_.pressed.empty() || scanner_.IsAcoustic()) // which knows nothing of it, and would be begun anew
     return;
   double mm = hold_.pressMm;
   if (isFollowing_) {
@@ -355,6 +358,8 @@ void Scan::SetControl(const char* name, const std::string& text)
     emit Said({Message::Warning, QString::fromUtf8(error.what()), {}});
     return;
   }
+  if (std::string_view(name) == "Source")
+    PressTissue();
   emit ControlsChanged();
   refinement_ = 0;
   Ask();
@@ -440,7 +445,7 @@ void Scan::Ask()
   const double now = Now();
   if (askedAt_ == 0.0)
     askedAt_ = now;
-  redraw_->Ask(static_cast<int>(1000.0 * std::max(0.0, frame_.seconds + FrameSeconds - now)));
+  redraw_->Ask(static_cast<int>(1000.0 * std::max(0.0, triedAt_ + FrameSeconds - now)));
 }
 
 void Scan::MakeNow()
@@ -534,8 +539,9 @@ void Scan::Show(const ScanFrame& frame, bool isNew, const QString& failure, doub
 {
   const QString before = shownState_;
   failure_ = failure;
-  frame_ = frame;
+  triedAt_ = frame.seconds;
   if (!HasFailed()) {
+    frame_ = frame;
     picture_ = scanner_.Picture();
     if (frame.isInAir)
       picture_.image.fill(Qt::black); // all of the sound comes back from the air

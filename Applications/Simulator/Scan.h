@@ -29,6 +29,7 @@ struct Subject {
   QString whyNoSkin;
   std::optional<Pose> start;                    ///< where it was scanned from, if that is known
   Eigen::Vector3d up = Eigen::Vector3d::Zero(); ///< from where it is scanned instead; zero: nobody says
+  QByteArray sum;                               ///< of what was read (ScanLog.h): a recording says what it is of
 
   bool IsEmpty() const { return volumes.empty() && !tissue; }
 };
@@ -173,7 +174,7 @@ private:
 
   Redraw* redraw_;
   QElapsedTimer clock_;
-  double askedAt_ = 0.0, latencyMs_;
+  double askedAt_ = 0.0, triedAt_ = 0.0, latencyMs_;
   ScanFrame frame_;
   std::int64_t number_ = 0;
   PlanePicture picture_;

@@ -145,7 +145,7 @@ ScanLogWriter::ScanLogWriter(const QString& path, const Subject& subject) : file
     throw Error(Error::Kind::FileSystem, QString("%1: %2").arg(path, file_.errorString()).toStdString());
   Write(LineOf({{"schema", SchemaOf(ScanLog::Version)},
                 {"volumes", QJsonArray::fromStringList(subject.files)},
-                {"body", QString(SumOf(subject))}}));
+                {"body", QString(subject.sum)}}));
 }
 
 void ScanLogWriter::Write(const QByteArray& line)

@@ -41,7 +41,7 @@ QByteArray SumOf(const Subject& subject, int version = ScanLog::Version);
 /// Writes such a log. A line is in the file once Release() has let it out.
 class ScanLogWriter {
 public:
-  /// \throws Error(FileSystem)
+  /// \param subject as ReadSubject gave it \throws Error(FileSystem)
   ScanLogWriter(const QString& path, const Subject& subject);
   void Append(const ScanFrame& frame, vtkImageData* image);
   /// Writes the lines of the first \a frames: of those whose images are safe. \throws Error(FileSystem) when the disk is full

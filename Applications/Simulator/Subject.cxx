@@ -3,6 +3,7 @@
 #include "Core/Base/Error.h"
 #include "Filters/Scenes/SceneRun.h"
 #include "Scan.h"
+#include "ScanLog.h"
 #include "VolumeReading.h"
 #include <algorithm>
 #include <vtkCellArray.h>
@@ -112,6 +113,7 @@ Subject ReadSubject(const QStringList& files, const QString& skin, const Progres
   }
   if (subject.skin)
     subject.mesh = MeshOf(subject.skin, skin.isEmpty() ? "the skin of " + files.first().toStdString() : skin.toStdString());
+  subject.sum = SumOf(subject);
   return subject;
 }
 

@@ -187,6 +187,10 @@ void TaskPanel::Save(std::variant<FindPlane, MeasureLength, ReachTarget> goal)
 
 void TaskPanel::SavePlane()
 {
+  if (scan_->Picture().image.isNull()) {
+    emit scan_->Said({Message::Note, tr("There is no image to make a task of"), {}});
+    return;
+  }
   FindPlane plane;
   plane.probeToWorld = scan_->Frame().probeToWorld;
   plane.depthMm = 0.5 * scan_->Scanner().Probe().depthMax;
@@ -330,6 +334,8 @@ void TaskPanel::Submit()
     const std::vector<CalliperLine> lines = image_->Callipers();
     if (isLength && lines.empty())
       throw Error(Error::Kind::BadInput, "measure first: key C, then a click on both ends");
+    if (scan_->Picture().image.isNull())
+      throw Error(Error::Kind::BadInput, "there is no image to answer with");
     if (IsForNeedle() && !needle_->IsShown())
       throw Error(Error::Kind::BadInput, "there is no needle: key N");
     Watch();

@@ -20,6 +20,7 @@ class TestScanBodies : public FolderTest {
 private slots:
   void aThinBodyIsShownAsDeepAsItIs();
   void aBodyGivesWayAsItsStatesSay();
+  void theAcousticModelIsNotBegunAnewForAPressure();
   void statesThatAreNoneOrOfAnotherBodyAreRefused();
 
 private:
@@ -145,6 +146,33 @@ void TestScanBodies::aBodyGivesWayAsItsStatesSay()
   QVERIFY(window.Open({three, body, nine}));
   window.Move(Qt::Key_PageDown, Qt::NoModifier, 6);
   QVERIFY(std::fabs(before - BallDepth(window) - 3.0) < 0.6);
+}
+
+void TestScanBodies::theAcousticModelIsNotBegunAnewForAPressure()
+{
+  SimulatorUnderTest window;
+  QVERIFY(window.Open({body::WriteScene(Folder())}));
+  const Pose rest = window.Scan().ProbeToWorld();
+  QVERIFY(window.Open({WriteState("three.vti", rest, 3.0)})); // of the scene that is open
+  const auto pressed = [&window] {
+    ParameterList parameters = window.Scan().Scanner().Parameters();
+    return Named(parameters, "PressMm").Number();
+  };
+  const auto pressBy = [&](double mm) {
+    Pose deeper = rest;
+    deeper.translation() += mm * rest.linear().col(2);
+    window.Scan().Follow(deeper.matrix());
+  };
+  pressBy(1.0);
+  QCOMPARE(pressed(), 1.0);
+  window.Scan().SetControl("Source", "acoustic");
+  window.Scan().MakeNow();
+  QVERIFY(window.Scan().IsMaking());
+  pressBy(2.0);
+  QVERIFY(window.Scan().IsMaking());
+  // What shows it knows it.
+  window.Scan().SetControl("Source", "scene");
+  QCOMPARE(pressed(), 2.0);
 }
 
 void TestScanBodies::statesThatAreNoneOrOfAnotherBodyAreRefused()

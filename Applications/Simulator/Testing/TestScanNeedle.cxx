@@ -435,6 +435,16 @@ void TestScanNeedle::aTrackedToolThatRestsDisturbsNothing()
     window.Scan().SetControl("NeedleStops", stops);
     QTRY_VERIFY_WITH_TIMEOUT(window.Scan().Frame().number > before && refinement() == "3", 60000);
   }
+  // Nor is it given up because the tool moves: whether that met bone (of 6 mm about 0, 0, 30) is told with the picture.
+  poll.stop();
+  tool.translation()[0] += 1.0;
+  needle.Follow(tool.matrix());
+  window.Scan().MakeNow();
+  QVERIFY(window.Scan().IsMaking() && !needle.HasMetBone());
+  tool.translation() = Vector3d(0.0, 0.0, 30.0);
+  needle.Follow(tool.matrix());
+  QVERIFY(window.Scan().IsMaking() && needle.Now().tip == tool.translation());
+  QTRY_VERIFY_WITH_TIMEOUT(needle.HasMetBone(), 60000);
 }
 
 void TestScanNeedle::whatATrackerOrAFrozenImageHoldsKeepsItsGuide()

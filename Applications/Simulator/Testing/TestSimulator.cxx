@@ -16,6 +16,7 @@
 #include <QJsonDocument>
 #include <QJsonObject>
 #include <QLabel>
+#include <QLineEdit>
 #include <QPushButton>
 #include <QSlider>
 #include <QStandardPaths>
@@ -70,6 +71,7 @@ private slots:
   void aSlowPictureIsGivenUpForANewPose();
   void whatIsInventedIsColouredOrHidden();
   void closingAsks();
+  void anImageThatFailsLeavesTheOneBefore();
   void thePicturesOfTheManual();
 };
 
@@ -739,10 +741,53 @@ void TestSimulator::closingAsks()
   QTRY_VERIFY(!window.Window().isVisible());
   QCOMPARE(Folder().entryList({"*.igs.mha"}).size(), 1); // all of it
   QVERIFY(Folder().entryList({"*.igs.mhd", "*.igs.raw"}).isEmpty());
-  // With nothing at stake it closes at once.
   SimulatorUnderTest other;
   QVERIFY(other.Open({Folder().filePath("body.mha")}));
+  other.Part<OutputPanel>("outputPanel")->SetFolder(Folder());
+  // What could not be put into one file is told before the window goes; so is that nothing was recorded.
+  other.Part<QPushButton>("record")->click();
+  other.Move(Qt::Key_Right);
+  QVERIFY(QFile::remove(Folder().filePath(Folder().entryList({"*.igs.raw"}).value(0))));
+  QVERIFY(!other.Window().close());
+  QVERIFY(other.Answer("End it and close"));
+  QVERIFY(other.Wait());
+  other.Settle();
+  QVERIFY(other.Window().isVisible());
+  QVERIFY2(other.HasMessage(".igs.raw"), qPrintable(other.Messages().join('\n')));
+  other.Key(Qt::Key_Space);
+  other.Part<QPushButton>("record")->click();
+  QVERIFY(!other.Window().close());
+  QVERIFY(other.Answer("End it and close"));
+  other.Settle();
+  QVERIFY(other.Window().isVisible());
+  // With nothing at stake it closes at once.
   QVERIFY(other.Window().close());
+}
+
+void TestSimulator::anImageThatFailsLeavesTheOneBefore()
+{
+  SimulatorUnderTest window;
+  QVERIFY(window.Open({body::WriteWithBall(Folder())}));
+  const ScanFrame before = window.Scan().Frame();
+  const QImage image = window.Scan().Picture().image;
+  vtkImageData* volume = window.Scan().Body().volumes.front();
+  volume->GetPointData()->Initialize();
+  volume->Modified();
+  window.Move(Qt::Key_Right);
+  QVERIFY(window.Scan().HasFailed());
+  QVERIFY((window.Place() - before.probeToWorld.translation()).norm() > 1.0);
+  // Image and pose stay together: what is saved, asked for or answered is what is seen.
+  QCOMPARE(window.Scan().Picture().image, image);
+  QCOMPARE(window.Scan().Frame().number, before.number);
+  QVERIFY(window.Scan().Frame().probeToWorld.matrix() == before.probeToWorld.matrix());
+  // Of a body whose first image fails there is none, least of all of the body before.
+  Subject other = window.Scan().Body();
+  window.Scan().SetSubject(other);
+  window.Frame();
+  QVERIFY(window.Scan().HasFailed() && window.Scan().Picture().image.isNull());
+  window.Part<QLineEdit>("taskName")->setText("nothing");
+  window.Part<QPushButton>("savePlane")->click();
+  QVERIFY2(window.HasMessage("no image to make a task of"), qPrintable(window.Messages().join('\n')));
 }
 
 void TestSimulator::thePicturesOfTheManual()
