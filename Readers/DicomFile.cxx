@@ -15,6 +15,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <map>
 
 namespace fs = std::filesystem;
@@ -240,9 +241,13 @@ private:
     return files_.size() > 1 ? NameOf(files_[slice.file].path) : "frame " + std::to_string(slice.picture + 1);
   }
 
+  using TimeOf = double (*)(const DicomPicture&);
+  static double NumberOf(const DicomPicture& picture) { return *picture.timeIndex; }
+  static double SecondsOf(const DicomPicture& picture) { return *picture.time; }
+  static double AtOnce(const DicomPicture&) { return 0.0; }
+
   void PlaceByPlanes(DicomPlane DicomPicture::*plane)
   {
-    // By time: seconds where all pictures have them, else their numbers.
     std::vector<Slice> all;
     std::size_t others = 0;
     bool seconds = true, numbers = true;
@@ -261,28 +266,51 @@ private:
       Fail("none of its pictures holds tissue intensities");
     if (others > 0)
       Note(std::to_string(others) + " pictures that hold no tissue intensities are left out.");
-    std::map<double, std::vector<Slice>> volumes;
-    for (const Slice& slice : all) {
-      const DicomPicture& picture = PictureOf(slice);
-      volumes[seconds ? *picture.time : numbers ? *picture.timeIndex : 0.0].push_back(slice);
+    // The number of a volume is the same for its pictures; a trigger time may be each picture's own. Where numbers make no
+    // volumes, times may.
+    try {
+      MakeVolumes(all, plane, numbers ? NumberOf : seconds ? SecondsOf : AtOnce);
+    } catch (const Error&) {
+      if (!numbers || !seconds)
+        throw;
+      MakeVolumes(all, plane, SecondsOf);
     }
+    if (plane == &DicomPicture::volume)
+      Note("The world is the scanner's volume frame of reference; the file does not say where the patient lies.");
+    PlaceProbe(plane);
+  }
+
+  // Parts pictures into volumes by their time; these must lie on one grid.
+  void MakeVolumes(const std::vector<Slice>& all, DicomPlane DicomPicture::*plane, TimeOf timeOf)
+  {
+    std::map<double, std::vector<Slice>> volumes;
+    for (const Slice& slice : all)
+      volumes[timeOf(PictureOf(slice))].push_back(slice);
+    slices_.clear();
+    std::vector<std::optional<double>> begins; // seconds
     for (auto& [time, slices] : volumes) {
       const ImageGeometry geometry = Arrange(slices, plane);
       if (slices_.empty())
         content_.geometry = geometry;
-      else if (!content_.geometry.AgreesWith(geometry, 1e-2))
+      else if (!content_.geometry.AgreesWith(geometry, 1e-2)) {
+        if (volumes.size() == all.size())
+          return MakeVolumes(all, plane, AtOnce); // one volume, whose pictures were taken one after the other
         Fail("its volumes at different times do not lie on one grid (the first has " +
              std::to_string(content_.geometry.dimensions[2]) + " slices, that at time " + NumberText(time) + " has " +
              std::to_string(geometry.dimensions[2]) + ")");
+      }
       slices_.insert(slices_.end(), slices.begin(), slices.end());
-      if (volumes.size() > 1)
-        content_.times.push_back(time);
+      begins.push_back(PictureOf(slices[0]).time);
+      for (const Slice& slice : slices)
+        begins.back() = std::min(begins.back(), PictureOf(slice).time);
     }
-    if (volumes.size() > 1 && !seconds)
+    if (volumes.size() == 1)
+      return;
+    const bool inSeconds = begins[0] && std::adjacent_find(begins.begin(), begins.end(), std::greater_equal<>()) == begins.end();
+    for (const auto& [time, slices] : volumes)
+      content_.times.push_back(inSeconds ? *begins[content_.times.size()] : time);
+    if (!inSeconds)
       Note("Its times are numbers of volumes, not seconds; the file does not say those.");
-    if (plane == &DicomPicture::volume)
-      Note("The world is the scanner's volume frame of reference; the file does not say where the patient lies.");
-    PlaceProbe(plane);
   }
 
   // Sorts the slices of one volume along their normal. \returns the grid that they make
@@ -327,16 +355,14 @@ private:
     for (std::size_t i = 0; i < steps.size(); ++i) {
       const std::string between = "between " + WhereIs(slices[i]) + " and " + WhereIs(slices[i + 1]);
       if (!(steps[i] > tolerance))
-        FailFile(content_.path,
-                 "two pictures lie at the same place (" + WhereIs(slices[i]) + " and " + WhereIs(slices[i + 1]) + ")");
+        Fail("two pictures lie at the same place (" + WhereIs(slices[i]) + " and " + WhereIs(slices[i + 1]) + ")");
       if (std::abs(steps[i] - median) > tolerance)
         Fail("its slices are unevenly spaced: " + Mm(steps[i]) + " " + between + ", " + NumberText(median) +
              " mm elsewhere; are slices missing?");
       const Eigen::Vector3d there = geometry.origin + normal * (slices[i + 1].along - slices[0].along);
       const double aside = (*(PictureOf(slices[i + 1]).*plane).position - there).norm();
       if (aside > std::max(evenness, 1e-2 * one.spacing.minCoeff()))
-        FailFile(content_.path,
-                 WhereIs(slices[i + 1]) + " lies " + Mm(aside) + " beside the normal of the others: the volume is sheared");
+        Fail(WhereIs(slices[i + 1]) + " lies " + Mm(aside) + " beside the normal of the others: the volume is sheared");
     }
     geometry.spacing[2] = step;
     return geometry;

@@ -14,7 +14,8 @@ bool IsDicomFolder(const std::string& path);
 /// * objects with functional groups (Enhanced US Volume): their pictures are placed by the patient's planes or, where there
 ///   are none, by the volume's, in the scanner's own frame; pictures that are no tissue intensities are left out; a temporal
 ///   position makes a time series. Volume to Transducer becomes probeToWorld (their x is our x, their y our z);
-/// * slices in a file each, of one SeriesInstanceUID, sorted along their normal; the others are looked for in the folder;
+/// * slices in a file each, of one SeriesInstanceUID, sorted along their normal; the others are looked for in the folder. A
+///   temporal position makes a time series, too; trigger times may be those of volumes or each slice's own;
 /// * files of several frames that say that these are counted by space and how far apart; Cartesian volumes of Philips (QLAB's
 ///   export and Affiniti) by private elements that are publicly known;
 /// * GE Kretz files inside DICOM (private element (7FE1,1101)), as OpenKretz reads them;

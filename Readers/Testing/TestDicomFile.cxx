@@ -127,6 +127,30 @@ TEST_F(DicomFile, SlicesOfASeries)
   }
 }
 
+// Volumes of three slices by their numbers; trigger times may be those of volumes or of slices.
+TEST_F(DicomFile, TimesOfVolumesAndOfSlices)
+{
+  const auto times = [this](int volumes, int volumeNumber, int sliceNumber, int volumeTime, int sliceTime) {
+    for (int t = 0; t < volumes; ++t)
+      for (int k = 0; k < 3; ++k)
+        Put("s" + std::to_string(3 * t + k),
+            Start + Element(0x18, 0x1060, "DS", std::to_string(t * volumeTime + k * sliceTime)) +
+                Element(0x20, 0x100, "IS", std::to_string(1 + t * volumeNumber + k * sliceNumber)) + Slice(k));
+    const auto source = OpenVolume(folder.string());
+    EXPECT_EQ(source->Content().geometry.dimensions, (std::array<int, 3>{8, 6, 3}));
+    EXPECT_EQ(source->Content().geometry.spacing[2], 2.0);
+    return source->Content().times;
+  };
+  EXPECT_EQ(times(1, 1, 0, 0, 10), std::vector<double>{});
+  EXPECT_EQ(times(1, 1, 1, 0, 10), std::vector<double>{});
+  EXPECT_EQ(times(2, 1, 0, 100, 0), (std::vector<double>{0.0, 0.1}));
+  EXPECT_EQ(times(2, 1, 0, 100, 10), (std::vector<double>{0.0, 0.1}));
+  EXPECT_EQ(times(2, 1, 0, 0, 0), (std::vector<double>{1, 2})) << "their numbers";
+  EXPECT_EQ(times(2, 0, 0, 100, 0), (std::vector<double>{0.0, 0.1})) << "no numbers of volumes";
+  EXPECT_EQ(times(2, 0, 1, 100, 0), (std::vector<double>{0.0, 0.1})) << "numbers of slices";
+  ExpectRefused([&] { times(2, 0, 1, 100, 10); }, Error::Kind::BadFile, folder.string(), "same place");
+}
+
 // What gdcm writes, it reads. (JPEG 2000 is in TestDicom.py: gdcm's own encoder writes beyond its buffer for small pictures.)
 TEST_F(DicomFile, LosslessCompressions)
 {
