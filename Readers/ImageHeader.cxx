@@ -219,6 +219,39 @@ std::string JoinedNumbers(const double* numbers, int count)
   return text;
 }
 
+std::string GeometryText(const ImageGeometry& g)
+{
+  const Eigen::Matrix3d rows = g.direction.transpose(); // Eigen stores columns
+  return JoinedNumbers(g.origin.data(), 3) + " " + JoinedNumbers(g.spacing.data(), 3) + " " + JoinedNumbers(rows.data(), 9);
+}
+
+std::optional<ImageGeometry> GeometryOfText(std::string_view text, const std::array<int, 3>& dimensions)
+{
+  std::array<double, 15> numbers;
+  const std::vector<std::string_view> words = SplitWords(text);
+  bool good = words.size() == numbers.size();
+  for (std::size_t i = 0; good && i < numbers.size(); ++i)
+    good = ParseNumber(words[i], numbers[i]);
+  if (!good)
+    return std::nullopt;
+  using Vector = Eigen::Map<const Eigen::Vector3d>;
+  const Eigen::Map<const Eigen::Matrix3d> rows(numbers.data() + 6);
+  return ImageGeometry{dimensions, Vector(numbers.data()), Vector(numbers.data() + 3), rows.transpose()};
+}
+
+bool IsPose(const HeaderField& field)
+{
+  return field.first == OurFields + "ProbeToWorld" || field.first == OurFields + "ImageToWorld";
+}
+
+std::vector<HeaderField> FieldsInFile(const ImageHeader& header)
+{
+  std::vector<HeaderField> fields = header.fields;
+  if (std::any_of(fields.begin(), fields.end(), IsPose))
+    fields.emplace_back(GeometryField, GeometryText(header.geometry));
+  return fields;
+}
+
 std::string DetachedName(const std::string& path, const std::string& extension)
 {
   const std::string name = fs::path(path).stem().string() + extension;

@@ -3,6 +3,7 @@
 #include "Core/Geometry/ImageGeometry.h"
 #include "Readers/VoxelType.h"
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -88,6 +89,19 @@ std::string JoinedNumbers(const double* numbers, int count);
 /// \param compressedSizeAt where the size of the compressed voxels is to be put (20 characters), 0 when nowhere
 std::string MetaImageHeaderText(const ImageHeader& header, const std::string& dataFile, std::size_t& compressedSizeAt);
 std::string NrrdHeaderText(const ImageHeader& header, const std::string& dataFile);
+
+/// How the names of our fields begin in a header.
+inline const std::string OurFields = "Echorama_";
+
+/// Origin, spacing and direction, row by row; and back, or nothing when that is not what a text holds.
+std::string GeometryText(const ImageGeometry& geometry);
+std::optional<ImageGeometry> GeometryOfText(std::string_view text, const std::array<int, 3>& dimensions);
+
+/// The fields of a header as files hold them: where a pose is among them, the geometry that it belongs to is another, by which a
+/// reader notices that a program has changed the geometry and kept the pose (VolumeSource::LeaveOldPoses).
+std::vector<HeaderField> FieldsInFile(const ImageHeader& header);
+inline const std::string GeometryField = OurFields + "Geometry";
+bool IsPose(const HeaderField& field);
 
 /// Whether headers of both formats can hold a field so that it comes back the same: a key of letters, digits and _ . -
 /// that the formats do not use themselves, and a value of one line without blanks at its ends.

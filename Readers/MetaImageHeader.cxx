@@ -249,7 +249,7 @@ std::string MetaImageHeaderText(const ImageHeader& header, const std::string& da
   text +=
       "DimSize = " + NumberText(g.dimensions[0]) + " " + NumberText(g.dimensions[1]) + " " + NumberText(g.dimensions[2]) + "\n";
   text += std::string("ElementType = ") + MetaImageTypeName(header.type) + "\n";
-  for (const auto& [key, value] : header.fields)
+  for (const auto& [key, value] : FieldsInFile(header))
     text += key + " = " + value + "\n";
   return text + "ElementDataFile = " + (dataFile.empty() ? "LOCAL" : dataFile) + "\n";
 }

@@ -367,38 +367,25 @@ void NiftiSource::ReadComment(const std::string& text)
   std::istringstream lines(text);
   std::string line;
   std::getline(lines, line);
-  const std::vector<std::string_view> words = SplitWords(std::string_view(line).substr(NiftiCommentStart.size()));
-  std::array<double, 15> numbers;
-  bool good = words.size() == numbers.size();
-  for (std::size_t i = 0; good && i < numbers.size(); ++i)
-    good = ParseNumber(words[i], numbers[i]);
-  if (!good)
+  line.erase(0, NiftiCommentStart.size());
+  const auto exact = GeometryOfText(line, stored_.geometry.dimensions);
+  if (!exact)
     Fail("the geometry in the extension of its header is damaged");
-  ImageGeometry exact = stored_.geometry;
-  exact.origin = Eigen::Map<const Eigen::Vector3d>(numbers.data());
-  exact.spacing = Eigen::Map<const Eigen::Vector3d>(numbers.data() + 3);
-  exact.direction = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(numbers.data() + 6);
-  bool agrees = exact.AgreesWith(stored_.geometry, 1e-2) && !stored_.reverseSlices;
+  bool agrees = exact->AgreesWith(stored_.geometry, 1e-2) && !stored_.reverseSlices;
   try {
-    exact.Check(content_.path);
+    exact->Check(content_.path);
   } catch (const Error&) {
     agrees = false;
   }
   if (agrees)
-    content_.geometry = exact;
-  else
+    content_.geometry = *exact;
+  else {
     Note("another program has changed the geometry since Echorama wrote it: the new one was taken");
-  std::string left;
+    content_.fields.emplace_back(GeometryField, line);
+  }
   while (std::getline(lines, line))
-    if (const std::size_t equals = line.find('='); equals != std::string::npos) {
-      const std::string key = line.substr(0, equals);
-      if (!agrees && (key == "Echorama_ProbeToWorld" || key == "Echorama_ImageToWorld")) // true of the geometry of before
-        left += (left.empty() ? "" : " and ") + key.substr(key.find('_') + 1);
-      else
-        content_.fields.emplace_back(key, line.substr(equals + 1));
-    }
-  if (!left.empty())
-    Note(left + " belonged to the geometry of before, and was left out");
+    if (const std::size_t equals = line.find('='); equals != std::string::npos)
+      content_.fields.emplace_back(line.substr(0, equals), line.substr(equals + 1));
 }
 
 PlainOrGzip& NiftiSource::Data()

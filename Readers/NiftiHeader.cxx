@@ -223,15 +223,7 @@ std::string NiftiHeaderText(const std::string& path, const ImageHeader& header, 
     throw Error(Error::Kind::BadInput,
                 path + ": its geometry is beyond the range of 32-bit floats, which is all that NIfTI-1 has");
   std::string description = NiftiDescription;
-  std::string comment = NiftiCommentStart;
-  const auto add = [&](const auto& numbers) {
-    for (Eigen::Index i = 0; i < numbers.size(); ++i)
-      comment += " " + NumberText(numbers.data()[i]);
-  };
-  add(g.origin);
-  add(g.spacing);
-  add(Eigen::Matrix3d(g.direction.transpose())); // row by row
-  comment += "\n";
+  std::string comment = NiftiCommentStart + " " + GeometryText(g) + "\n";
   for (const HeaderField& field : header.fields) {
     if (field.first == "descrip" && field.second.size() < 80)
       description = field.second;

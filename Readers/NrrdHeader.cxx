@@ -437,7 +437,7 @@ std::string NrrdHeaderText(const ImageHeader& header, const std::string& dataFil
       "\nkinds: domain domain domain\nspace units: \"mm\" \"mm\" \"mm\"\nspace origin: " + VectorText(g.origin) + "\nencoding: ";
   text += header.encoding == ImageHeader::Encoding::Zlib ? "gzip" : "raw";
   text += header.bigEndian ? "\nendian: big\n" : "\nendian: little\n";
-  for (const auto& [key, value] : header.fields)
+  for (const auto& [key, value] : FieldsInFile(header))
     text += key + ":=" + EscapedNrrd(value) + "\n";
   return text + (dataFile.empty() ? "\n" : "data file: " + dataFile + "\n");
 }

@@ -9,6 +9,7 @@
 #include "Readers/NiftiFile.h"
 #include "Readers/VdbFile.h"
 #include "Readers/VolumeFile.h"
+#include <algorithm>
 
 namespace echorama {
 
@@ -20,6 +21,22 @@ void VolumeSource::ReadSlices(int, int, void*, const Progress&)
 void VolumeSource::ReadBeams(std::size_t, void*, const Progress&)
 {
   throw Error(Error::Kind::BadInput, content_.path + ": it holds no beams");
+}
+
+void VolumeSource::LeaveOldPoses()
+{
+  auto& fields = content_.fields;
+  const auto of = std::find_if(fields.begin(), fields.end(), [](const HeaderField& f) { return f.first == GeometryField; });
+  if (of == fields.end())
+    return;
+  const auto before = GeometryOfText(of->second, content_.geometry.dimensions);
+  fields.erase(of);
+  if (before && before->AgreesWith(content_.geometry, 1e-2))
+    return;
+  for (const HeaderField& field : fields)
+    if (IsPose(field))
+      Note(field.first.substr(OurFields.size()) + " belonged to a geometry that another program has changed, and was left out");
+  fields.erase(std::remove_if(fields.begin(), fields.end(), IsPose), fields.end());
 }
 
 ParameterList Describe(VolumeReadParameters& p)
@@ -70,7 +87,9 @@ std::unique_ptr<VolumeSource> OpenWhole(const std::string& path, const VolumeRea
 std::unique_ptr<VolumeSource> OpenVolume(const std::string& path, const VolumeReadParameters& parameters)
 {
   CheckRanges(parameters, path);
-  return CoarseVolume(OpenWhole(path, parameters), parameters.stride);
+  auto whole = OpenWhole(path, parameters);
+  whole->LeaveOldPoses();
+  return CoarseVolume(std::move(whole), parameters.stride);
 }
 
 } // namespace echorama

@@ -65,6 +65,9 @@ public:
   /// Writes the samples of volume \a index to \a samples; only where the content has beams.
   virtual void ReadBeams(std::size_t index, void* samples, const Progress& progress = {});
 
+  /// Leaves out poses that belong to another geometry than that of the file (see FieldsInFile), with a note.
+  void LeaveOldPoses();
+
 protected:
   VolumeSource(const std::string& path, FileFormat format)
   {

@@ -42,8 +42,6 @@ vtkStandardNewMacro(vtkUltrasoundReader);
 vtkUltrasoundParametersMacro(vtkUltrasoundReader);
 
 namespace {
-const std::string FieldPrefix = "Echorama_"; // of our fields in a file's header
-
 // An array for the voxels of a file, which are read into its memory directly.
 vtkSmartPointer<vtkDataArray> NewArray(VoxelType type, std::size_t count, const char* name)
 {
@@ -504,8 +502,8 @@ void vtkUltrasoundReader::SetFields(const VolumeContent& content, vtkImageData* 
   const std::vector<std::string> acquisition = vtkUltrasoundAcquisition::Names();
   for (const HeaderField& field : content.fields) {
     const std::string& name = field.first;
-    if (name.compare(0, FieldPrefix.size(), FieldPrefix) == 0) {
-      if (!vtkUltrasoundAcquisition::SetFromText(output, name.substr(FieldPrefix.size()), field.second)) {
+    if (name.compare(0, echorama::OurFields.size(), echorama::OurFields) == 0) {
+      if (!vtkUltrasoundAcquisition::SetFromText(output, name.substr(echorama::OurFields.size()), field.second)) {
         this->Notes.push_back("the header's " + name + " could not be understood and was left out");
       }
     } else if (std::find(acquisition.begin(), acquisition.end(), name) != acquisition.end()) {

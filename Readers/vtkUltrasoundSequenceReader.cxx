@@ -44,8 +44,6 @@ vtkStandardNewMacro(vtkUltrasoundSequenceReader);
 vtkUltrasoundParametersMacro(vtkUltrasoundSequenceReader);
 
 namespace {
-const std::string FieldPrefix = "Echorama_"; // of our fields in a file's header
-
 std::string TextOf(const char* text)
 {
   return text ? text : "";
@@ -362,8 +360,8 @@ void vtkUltrasoundSequenceReader::ReadFrame(int index, vtkImageData* output, con
   }
   // Ours come back as what they were.
   const auto add = [output](const std::string& key, const std::string& value, const std::string& prefix) {
-    if (key.compare(0, FieldPrefix.size(), FieldPrefix) != 0 ||
-        !vtkUltrasoundAcquisition::SetFromText(output, key.substr(FieldPrefix.size()), value)) {
+    if (key.compare(0, echorama::OurFields.size(), echorama::OurFields) != 0 ||
+        !vtkUltrasoundAcquisition::SetFromText(output, key.substr(echorama::OurFields.size()), value)) {
       vtkUltrasoundVolume::AddField(output, (prefix + key).c_str(), value);
     }
   };

@@ -34,8 +34,7 @@ vtkStandardNewMacro(vtkUltrasoundSequenceWriter);
 vtkUltrasoundParametersMacro(vtkUltrasoundSequenceWriter);
 
 namespace {
-const std::string FieldPrefix = "Echorama_"; // of our fields in a file's header
-const std::string FramePrefix = "Frame_";    // of fields of single frames
+const std::string FramePrefix = "Frame_"; // of fields of single frames
 
 std::optional<std::string> StringOf(vtkImageData* image, const std::string& name)
 {
@@ -116,7 +115,7 @@ SequenceContent ContentOf(vtkImageData* image, const std::string& path, std::vec
   for (const auto& [name, text] : vtkUltrasoundAcquisition::ToText(image)) {
     if (name == vtkUltrasoundAcquisition::ProbeGeometryName() || name == vtkUltrasoundAcquisition::SeedName() ||
         name == vtkUltrasoundAcquisition::SceneName()) {
-      content.fields.emplace_back(FieldPrefix + name, text);
+      content.fields.emplace_back(echorama::OurFields + name, text);
     }
   }
   if (!placed && image->GetNumberOfPoints() > 0) {
@@ -144,7 +143,7 @@ SequenceFrame FrameOf(vtkImageData* image, double timeStep, bool& placed)
   }
   for (const auto& [name, text] : vtkUltrasoundAcquisition::ToText(image)) {
     if (name == vtkUltrasoundAcquisition::ProbeToWorldName()) {
-      frame.fields.emplace_back(FieldPrefix + name, text);
+      frame.fields.emplace_back(echorama::OurFields + name, text);
     }
   }
   const auto imageToWorld = vtkUltrasoundAcquisition::ImageToWorldOf(image);

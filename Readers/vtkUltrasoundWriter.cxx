@@ -47,7 +47,6 @@ vtkStandardNewMacro(vtkUltrasoundWriter);
 vtkUltrasoundParametersMacro(vtkUltrasoundWriter);
 
 namespace {
-const std::string FieldPrefix = "Echorama_"; // of our fields in a file's header
 const char* const UnknownExtension = ": the extension must be .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .vdb or .vti";
 
 using Extent = std::array<int, 6>;
@@ -159,7 +158,7 @@ std::vector<echorama::HeaderField> FieldsOf(const Slab& slab, std::vector<std::s
   std::vector<echorama::HeaderField> held;
   vtkImageData* image = slab.Image;
   for (const auto& [name, text] : vtkUltrasoundAcquisition::ToText(image)) {
-    held.emplace_back(FieldPrefix + name, text);
+    held.emplace_back(echorama::OurFields + name, text);
   }
   const std::vector<std::string> acquisition = vtkUltrasoundAcquisition::Names();
   vtkFieldData* fields = image->GetFieldData();

@@ -436,7 +436,7 @@ void Write(const std::string& path, const ImageHeader& header, const void* voxel
     grid->setGridClass(openvdb::GRID_FOG_VOLUME);
     grid->insertMeta(TypeKey, openvdb::StringMetadata(VdbTypeNames[static_cast<int>(header.type)]));
     grid->insertMeta(DimensionsKey, openvdb::Vec3IMetadata(openvdb::Vec3i(g.dimensions[0], g.dimensions[1], g.dimensions[2])));
-    for (const HeaderField& field : header.fields)
+    for (const HeaderField& field : FieldsInFile(header))
       grid->insertMeta(FieldPrefix + field.first, openvdb::StringMetadata(field.second));
     Archive archive;
     archive.setCompression(openvdb::io::COMPRESS_ACTIVE_MASK |

@@ -169,14 +169,19 @@ TEST_F(NiftiFile, ManySlicesNeedVersionTwo)
 
 TEST_F(NiftiFile, WhatAnotherProgramMovedStaysMoved)
 {
-  const ImageHeader wanted = Oblique(VoxelType::UInt8);
+  ImageHeader wanted = Oblique(VoxelType::UInt8);
+  const std::vector<HeaderField> others = wanted.fields;
+  wanted.fields.emplace_back("Echorama_ImageToWorld", "1 0 0 5 0 1 0 6 0 0 1 7 0 0 0 1");
   Write("a.nii", wanted, Values<unsigned char>(60).data());
+  EXPECT_EQ(OpenVolume(Path("a.nii"))->Content().fields, wanted.fields);
   std::fstream stream(Path("a.nii"), std::ios::binary | std::ios::in | std::ios::out);
   const float x = 7.f; // srow_x, last
   stream.seekp(292);
   stream.write(reinterpret_cast<const char*>(&x), sizeof x);
   stream.close();
-  const auto source = OpenNifti(Path("a.nii"));
+  const auto source = OpenVolume(Path("a.nii"));
+  EXPECT_EQ(source->Content().fields, others);
+  EXPECT_TRUE(HasNote(source->Content(), "ImageToWorld belonged to a geometry"));
   EXPECT_NEAR(source->Content().geometry.origin[0], -7.0, 1e-6);
   EXPECT_NEAR(source->Content().geometry.origin[1], wanted.geometry.origin[1], 1e-3);
   EXPECT_TRUE(HasNote(source->Content(), "another program"));

@@ -8,6 +8,7 @@
 #include "Readers/DataFile.h"
 #include "Readers/Testing/ObliqueVolume.h"
 #include "Readers/VolumeFile.h"
+#include "Readers/VolumeSource.h"
 #include "Readers/VolumeWriter.h"
 #include "Testing/TemporaryFolder.h"
 #include <algorithm>
@@ -86,6 +87,28 @@ TEST_F(VolumeFile, EveryTypeFormatAndCompressionComesBack)
             EXPECT_LT((header.geometry.direction - wanted.geometry.direction).norm(), 1e-15);
           }
         });
+}
+
+TEST_F(VolumeFile, PosesOfAnotherGeometryAreLeftOut)
+{
+  ImageHeader header = Oblique(VoxelType::UInt8);
+  const std::vector<HeaderField> others = header.fields;
+  header.fields.emplace_back("Echorama_ProbeToWorld", "1 0 0 5 0 1 0 6 0 0 1 7 0 0 0 1");
+  for (const auto& [name, origin] : {std::pair("a.mha", "Offset = "), std::pair("a.nrrd", "space origin: (")}) {
+    Write(name, header, Values<unsigned char>(60).data(), false);
+    VolumeReadParameters parameters;
+    for (parameters.stride = 1; parameters.stride < 3; ++parameters.stride)
+      EXPECT_EQ(OpenVolume(Path(name), parameters)->Content().fields, header.fields) << name;
+    std::stringstream bytes;
+    bytes << std::ifstream(Path(name), std::ios::binary).rdbuf();
+    std::string moved = bytes.str();
+    moved.insert(moved.find(origin) + std::string(origin).size(), "1"); // 1 mm and more
+    Put(name, moved);
+    const auto source = OpenVolume(Path(name));
+    EXPECT_EQ(source->Content().fields, others) << name;
+    ASSERT_EQ(source->Content().notes.size(), 1u);
+    EXPECT_EQ(source->Content().notes[0].find("ProbeToWorld belonged to a geometry"), 0u);
+  }
 }
 
 TEST_F(VolumeFile, BothByteOrdersOfEveryType)

@@ -143,6 +143,25 @@ TEST_F(VdbFile, ATurnedGridIsTurnedForOthersToo)
   }
 }
 
+TEST_F(VdbFile, APoseStaysBehindWhenAnotherProgramMovesTheGrid)
+{
+  ImageHeader header = Oblique(VoxelType::UInt8, NoMultiples);
+  const std::vector<HeaderField> others = header.fields;
+  header.fields.insert(header.fields.begin(), {"Echorama_ProbeToWorld", "1 0 0 5 0 1 0 6 0 0 1 7 0 0 0 1"});
+  const std::vector<unsigned char> voxels(header.geometry.VoxelCount(), 1);
+  const std::string path = Write("a.vdb", header, voxels.data(), nullptr);
+  EXPECT_EQ(OpenVolume(path)->Content().fields, header.fields);
+  openvdb::io::File file(path);
+  file.open();
+  const openvdb::GridBase::Ptr grid = file.readGrid("Intensity");
+  file.close();
+  grid->transform().postTranslate(openvdb::Vec3d(0, 0, 1));
+  const auto source = OpenVolume(Foreign({grid}));
+  EXPECT_NEAR(source->Content().geometry.origin.z(), header.geometry.origin.z() + 1, 1e-12);
+  EXPECT_EQ(source->Content().fields, others);
+  EXPECT_TRUE(HasNote(source->Content(), "ProbeToWorld belonged to a geometry"));
+}
+
 TEST_F(VdbFile, ASparseVolumeIsASmallFileThatOthersRead)
 {
   ImageHeader header;
