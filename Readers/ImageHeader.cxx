@@ -17,6 +17,7 @@
 #include <cctype>
 #include <filesystem>
 #include <limits>
+#include <map>
 
 namespace fs = std::filesystem;
 
@@ -209,6 +210,16 @@ void PlaceAxes(ImageHeader& header, int axes)
       header.notes.push_back(
           "the axes in the file are left-handed: the slices were taken in reverse, so that the pose is a rigid one");
   }
+}
+
+std::optional<double> Millimetres(const std::string& unit)
+{
+  static const std::map<std::string, double> lengths = {
+      {"", 1.0},         {"mm", 1.0},      {"millimeter", 1.0}, {"millimetre", 1.0}, {"cm", 10.0},    {"m", 1000.0},
+      {"inch", 25.4},    {"um", 1e-3},     {"\xC2\xB5m", 1e-3}, {"\xCE\xBCm", 1e-3}, {"\xB5m", 1e-3}, {"\\u00B5m", 1e-3},
+      {"&#181;m", 1e-3}, {"micron", 1e-3}, {"microns", 1e-3},   {"nm", 1e-6}};
+  const auto found = lengths.find(unit);
+  return found == lengths.end() ? std::nullopt : std::optional<double>(found->second);
 }
 
 std::string JoinedNumbers(const double* numbers, int count)

@@ -81,6 +81,9 @@ bool IsFrameField(std::string_view key);
 const char* MetaImageTypeName(VoxelType type);
 std::string NrrdTypeName(VoxelType type);
 
+/// Millimetres of a unit of length as files name it, "" being mm, or nothing when it is not known.
+std::optional<double> Millimetres(const std::string& unit);
+
 /// Numbers with blanks between them.
 std::string JoinedNumbers(const double* numbers, int count);
 

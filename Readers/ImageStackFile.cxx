@@ -14,7 +14,6 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
-#include <optional>
 
 namespace fs = std::filesystem;
 
@@ -83,30 +82,32 @@ std::pair<std::string, std::int64_t> SplitNumber(const std::string& name)
   return {name.substr(0, begin) + "#" + name.substr(end), number};
 }
 
-// The value of "key=value" in the lines of ImageJ's description, empty when it is not there.
-std::string ImageJValue(const std::string& description, const std::string& key)
+// What stands in a text between \a before and one of \a ends, empty when it is not there.
+std::string Between(const std::string& text, const std::string& before, const char* ends)
 {
-  const std::size_t at = ("\n" + description).find("\n" + key + "=");
-  if (at == std::string::npos)
-    return {};
-  const std::size_t begin = at + key.size() + 1;
-  return description.substr(begin, description.find_first_of("\r\n", begin) - begin);
+  const std::size_t at = text.find(before), begin = at + before.size();
+  return at == std::string::npos ? std::string() : text.substr(begin, text.find_first_of(ends, begin) - begin);
 }
 
-// mm of a unit of length as ImageJ writes it.
-std::optional<double> MmOfUnit(const std::string& unit)
+// The value of "key=value" in the lines of ImageJ's description.
+std::string ImageJValue(const std::string& description, const std::string& key)
 {
-  if (unit == "mm" || unit == "millimeter")
-    return 1.0;
-  if (unit == "cm")
-    return 10.0;
-  if (unit == "m")
-    return 1000.0;
-  if (unit == "um" || unit == "micron" || unit == "microns" || unit == "\\u00B5m" || unit == "\xc2\xb5m" || unit == "\xb5m")
-    return 0.001;
-  if (unit == "inch")
-    return 25.4;
-  return std::nullopt;
+  return Between("\n" + description, "\n" + key + "=", "\r\n");
+}
+
+// The value of an attribute in the XML of OME's.
+std::string OmeValue(std::string description, const std::string& key)
+{
+  std::replace_if(
+      description.begin(), description.end(), [](unsigned char c) { return std::isspace(c) != 0; }, ' ');
+  return Between(description, " " + key + "=\"", "\"");
+}
+
+// 0 for what is no length.
+double LengthOf(const std::string& text)
+{
+  double length = 0.0;
+  return ParseNumber(text, length) && length > 0.0 && std::isfinite(length) ? length : 0.0;
 }
 
 class ImageStack : public VolumeSource {
@@ -125,11 +126,9 @@ private:
   void NoteGaps();
   void CheckSlices();
   void FindSpacing(const VolumeReadParameters& parameters);
-  double ImageJSpacing(Eigen::Vector3d& spacing) const;
 
   std::vector<Picture> slices_;
-  std::string description_; // of a TIFF
-  std::array<float, 2> resolution_{};
+  Eigen::Vector3d described_ = Eigen::Vector3d::Zero(); // the spacing that a program wrote into a TIFF, 0: it did not
 };
 
 void ImageStack::Collect()
@@ -191,29 +190,35 @@ void ImageStack::Collect()
 void ImageStack::CollectPages(std::string path) // a copy: the slices are made anew
 {
   const TiffPages tiff = ReadTiffPages(path);
-  description_ = tiff.description;
-  resolution_ = tiff.resolution;
+  const std::string& text = tiff.description;
   slices_.clear();
   for (const std::uint64_t page : tiff.pages)
     slices_.push_back({path, PictureKind::Tiff, page});
   if (slices_.empty())
     FailFile(path, "it holds thumbnails alone");
-  // OME's images are those of all channels and times, in any order.
-  const std::string_view size = "SizeZ=\"";
-  if (const std::size_t at = description_.find(size); description_.find("<OME") != std::string::npos && at != std::string::npos) {
-    const std::string text = description_.substr(at + size.size(), description_.find('"', at + size.size()) - at - size.size());
-    if (std::size_t count = 0; ParseNumber(text, count) && count < slices_.size())
-      FailFile(path, "OME says that it has " + text + " slices, and there are " + std::to_string(slices_.size()) +
-                         " images: several channels or times of a volume; one is needed");
+  if (text.find("<OME") != std::string::npos) {
+    // Its images are those of all channels and times, in any order.
+    if (std::size_t count = 0; ParseNumber(OmeValue(text, "SizeZ"), count) && count < slices_.size())
+      FailFile(path, "OME says that it has " + std::to_string(count) + " slices, and there are " +
+                         std::to_string(slices_.size()) + " images: several channels or times of a volume; one is needed");
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::string size = std::string("PhysicalSize") + "XYZ"[axis], unit = OmeValue(text, size + "Unit");
+      described_[axis] = LengthOf(OmeValue(text, size)) * Millimetres(unit.empty() ? "um" : unit).value_or(0.0);
+    }
   }
-  if (description_.compare(0, 7, "ImageJ=") != 0)
-    description_.clear();
+  if (text.compare(0, 7, "ImageJ=") != 0)
+    return;
+  const auto perDot = [](float dots) { return dots > 0.f && std::isfinite(dots) ? 1.0 / static_cast<double>(dots) : 0.0; };
+  const std::string unit = ImageJValue(text, "unit");
+  if (const auto mm = Millimetres(unit); mm && !unit.empty())
+    described_ =
+        *mm * Eigen::Vector3d(perDot(tiff.resolution[0]), perDot(tiff.resolution[1]), LengthOf(ImageJValue(text, "spacing")));
   std::uint64_t images = 0;
-  if (ParseNumber(ImageJValue(description_, "images"), images) && images > slices_.size())
+  if (ParseNumber(ImageJValue(text, "images"), images) && images > slices_.size())
     FailFile(path, "ImageJ says that it holds " + std::to_string(images) + " images, and " + std::to_string(slices_.size()) +
                        " can be found: it is truncated, or larger than TIFF allows; save it as an image sequence");
   for (const char* axis : {"channels", "frames"})
-    if (int count = 1; ParseNumber(ImageJValue(description_, axis), count) && count > 1) {
+    if (int count = 1; ParseNumber(ImageJValue(text, axis), count) && count > 1) {
       if (static_cast<std::size_t>(count) != slices_.size())
         FailFile(path, "it holds " + std::to_string(count) + " " + axis + " of a volume; one is needed");
       Note("its " + std::to_string(count) + " " + axis + " were taken as slices");
@@ -287,26 +292,8 @@ void ImageStack::CheckSlices()
     Note("zero is white in the file: the numbers were turned round");
 }
 
-// The spacing that ImageJ wrote, 0 where it did not. \returns the mm of its unit, 0 when there is none.
-double ImageStack::ImageJSpacing(Eigen::Vector3d& spacing) const
-{
-  std::string unit = ImageJValue(description_, "unit");
-  const std::optional<double> mm = MmOfUnit(unit);
-  if (!mm)
-    return 0.0;
-  for (int axis = 0; axis < 2; ++axis)
-    if (resolution_[axis] > 0.f && std::isfinite(resolution_[axis]))
-      spacing[axis] = *mm / static_cast<double>(resolution_[axis]);
-  if (double between = 0.0; ParseNumber(ImageJValue(description_, "spacing"), between) && between > 0.0 && std::isfinite(between))
-    spacing[2] = *mm * between;
-  return *mm;
-}
-
 void ImageStack::FindSpacing(const VolumeReadParameters& parameters)
 {
-  CheckRanges(parameters, content_.path);
-  Eigen::Vector3d imageJ = Eigen::Vector3d::Zero();
-  ImageJSpacing(imageJ);
   Eigen::Vector3d spacing = parameters.stackSpacingMm;
   std::string said, assumed;
   for (int axis = 0; axis < 3; ++axis) {
@@ -314,8 +301,8 @@ void ImageStack::FindSpacing(const VolumeReadParameters& parameters)
       continue;
     const std::string name(1, "xyz"[axis]);
     const double dots = axis < 2 ? slices_[0].info.dotsPerMm[axis] : 0.0, dpi = dots * 25.4;
-    if (imageJ[axis] > 0.0)
-      spacing[axis] = imageJ[axis];
+    if (described_[axis] > 0.0)
+      spacing[axis] = described_[axis];
     else if (dots > 0.0 && std::isfinite(dots) && std::fabs(dpi - 72.0) > 0.5 && std::fabs(dpi - 96.0) > 0.5)
       spacing[axis] = 1.0 / dots;
     (spacing[axis] > 0.0 ? said : assumed) += (spacing[axis] > 0.0 ? said : assumed).empty() ? name : ", " + name;

@@ -24,12 +24,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <map>
-
-namespace fs = std::filesystem;
 
 namespace echorama {
 namespace {
@@ -97,7 +94,6 @@ public:
   KretzSource(const std::string& path, std::uint64_t offset, std::uint64_t bytes, const VolumeReadParameters& parameters)
     : VolumeSource(path, FileFormat::Kretz), stream_(OpenToRead(path)), begin_(offset), end_(offset + bytes)
   {
-    CheckRanges(parameters, path);
     FindItems();
     dimensions_ = {Dimension(DimensionI), Dimension(DimensionJ), Dimension(DimensionK)};
     FindSamples();
@@ -448,11 +444,7 @@ bool LooksLikeKretz(std::string_view start)
 
 std::unique_ptr<VolumeSource> OpenKretz(const std::string& path, const VolumeReadParameters& parameters)
 {
-  std::error_code error;
-  const std::uintmax_t bytes = fs::is_regular_file(path, error) ? fs::file_size(path, error) : 0;
-  if (error || !fs::is_regular_file(path, error))
-    throw Error(Error::Kind::FileSystem, path + ": there is no such file");
-  return OpenKretzWithin(path, 0, bytes, parameters);
+  return OpenKretzWithin(path, 0, FileSize(path), parameters);
 }
 
 std::unique_ptr<VolumeSource> OpenKretzWithin(const std::string& path, std::uint64_t offset, std::uint64_t bytes,

@@ -39,16 +39,6 @@ std::optional<VoxelType> TypeNamed(const std::string& name)
   return {};
 }
 
-// Millimetres of a unit, or nothing when we do not know it.
-std::optional<double> Millimetres(const std::string& unit)
-{
-  static const std::map<std::string, double> lengths = {
-      {"", 1.0},    {"mm", 1.0},         {"millimeter", 1.0}, {"millimetre", 1.0}, {"cm", 10.0},    {"m", 1000.0},
-      {"um", 1e-3}, {"\xC2\xB5m", 1e-3}, {"\xCE\xBCm", 1e-3}, {"microns", 1e-3},   {"micron", 1e-3}};
-  const auto found = lengths.find(unit);
-  return found == lengths.end() ? std::nullopt : std::optional<double>(found->second);
-}
-
 // Lower case, without blanks.
 std::string Plain(std::string_view text)
 {

@@ -199,7 +199,7 @@ TEST_F(ImageStackFile, AFolderInTheNaturalOrderOfItsNames)
   EXPECT_EQ(spaced->Content().geometry.spacing, parameters.stackSpacingMm);
   EXPECT_FALSE(HasNote(spaced->Content(), "spacing"));
   parameters.stackSpacingMm[1] = -1.0;
-  ExpectRefused([&] { OpenImageStack(folder.string(), parameters); }, Error::Kind::InvalidParameter, folder.string(),
+  ExpectRefused([&] { OpenVolume(folder.string(), parameters); }, Error::Kind::InvalidParameter, folder.string(),
                 "StackSpacingMm is (0.1 -1 0.3) mm; it must be at least 0");
 }
 
@@ -367,6 +367,30 @@ TEST_F(ImageStackFile, ChannelsAndTimesOfOmeAreNoSlices)
   EXPECT_EQ(OpenImageStack(write("SizeZ=\"4\" SizeC=\"1\" SizeT=\"1\""))->Content().geometry.dimensions[2], 4);
   Refused(write("SizeZ=\"2\" SizeC=\"2\" SizeT=\"1\""), "has 2 slices, and there are 4 images: several channels or times");
   Refused(write("SizeZ=\"2\" SizeC=\"1\" SizeT=\"2\""), "several channels or times");
+}
+
+TEST_F(ImageStackFile, SizesOfVoxelsThatOmeWrote)
+{
+  const auto page = Pattern<unsigned char>(5, 4);
+  Tiff t;
+  t.resolution = 100.0;
+  t.unit = RESUNIT_CENTIMETER;
+  const auto spacing = [&](const std::string& sizes, const Eigen::Vector3d& asked = Eigen::Vector3d::Zero()) -> Eigen::Vector3d {
+    t.description = "<?xml version=\"1.0\"?>\n<OME><Image><Pixels\n" + sizes + " SizeC=\"1\" SizeZ=\"4\"/></Image></OME>";
+    VolumeReadParameters parameters;
+    parameters.stackSpacingMm = asked;
+    return OpenImageStack(WriteTiff<unsigned char>("a.ome.tif", {page, page, page, page}, t), parameters)
+        ->Content()
+        .geometry.spacing;
+  };
+  const auto near = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b) { return (a - b).norm() < 1e-8; };
+  const std::string x = "PhysicalSizeX=\"250\" ", z = "PhysicalSizeZ=\"1\" PhysicalSizeZUnit=\"cm\"";
+  EXPECT_TRUE(near(spacing(x + "PhysicalSizeY=\"0.5\" PhysicalSizeYUnit=\"mm\"\n" + z), {0.25, 0.5, 10.0}));
+  EXPECT_TRUE(near(spacing(x + z), {0.25, 0.05, 10.0})) << "y: the resolution";
+  EXPECT_TRUE(near(spacing(x + z, {0.0, 0.0, 3.0}), {0.25, 0.05, 3.0}));
+  EXPECT_TRUE(near(spacing("PhysicalSizeX=\"2\" PhysicalSizeXUnit=\"pixel\""), {0.1, 0.05, 1.0}));
+  for (const char* unit : {"\xC2\xB5m", "&#181;m", "um"})
+    EXPECT_TRUE(near(spacing(x + "PhysicalSizeXUnit=\"" + unit + "\""), {0.25, 0.05, 1.0})) << unit;
 }
 
 TEST_F(ImageStackFile, BadImagesAreNamed)
