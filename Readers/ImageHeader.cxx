@@ -26,13 +26,6 @@ namespace {
 
 constexpr std::size_t LongestLine = 1000000;
 
-std::string LowerExtension(const std::string& path)
-{
-  std::string extension = fs::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
-  return extension;
-}
-
 // Whether a text has a line "key = ..." (the key at the beginning of the text or of a line).
 bool HasKey(const std::string& text, const std::string& key)
 {
@@ -106,6 +99,13 @@ FileFormat FormatOfContent(const std::string& path)
 const char* KnownFormats()
 {
   return "MetaImage, NRRD, NIfTI, DICOM, GE Kretz, OpenVDB, VTK image file and images (PNG, JPEG, TIFF)";
+}
+
+std::string LowerExtension(const std::string& path)
+{
+  std::string extension = fs::path(path).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  return extension;
 }
 
 FileFormat FormatOfName(const std::string& path)

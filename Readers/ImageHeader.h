@@ -23,6 +23,9 @@ const char* KnownFormats();
 /// What the extension of a name asks for: .mha .mhd, .nrrd .nhdr, .vti, .nii .nii.gz, .vdb (in any case of letters).
 FileFormat FormatOfName(const std::string& path);
 
+/// The extension of a name, in small letters: ".nii.gz" has ".gz".
+std::string LowerExtension(const std::string& path);
+
 /// "key = value" of a MetaImage header, "key:=value" of a NRRD header; line breaks inside values are escaped in files.
 using HeaderField = std::pair<std::string, std::string>;
 

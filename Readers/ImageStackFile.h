@@ -20,8 +20,8 @@ bool HoldsImages(const std::string& folder);
 /// slice. Spacing, for each axis: the parameters; what ImageJ or OME wrote into a TIFF; for x and y the resolution in the files,
 /// unless it is one of the screens' defaults, 72 and 96 dpi; 1 mm. All but the first come with a note. Colours become grey
 /// (luminance 0.299 R + 0.587 G + 0.114 B, which leaves equal channels as they are); transparency is dropped; other files in the
-/// folder and gaps in the numbers are noted. \throws Error as OpenVolume: names the image that is broken, or whose size or type
-/// is not that of the first.
+/// folder and gaps in the numbers are noted; turned images are refused. \throws Error as OpenVolume: names the image that is
+/// broken, or whose size or type is not that of the first.
 std::unique_ptr<VolumeSource> OpenImageStack(const std::string& path, const VolumeReadParameters& parameters = {});
 
 } // namespace echorama

@@ -17,6 +17,8 @@
 namespace echorama {
 namespace {
 
+constexpr char PictureTurned[] = "it does not begin at its top left (orientation %d): turned or mirrored pictures are not read";
+
 //------------------------------------------------------------------------------------------------ PNG
 void PngError(png_structp png, png_const_charp message)
 {
@@ -83,6 +85,24 @@ void JpegError(j_common_ptr jpeg)
 
 void JpegMessage(j_common_ptr) {}
 
+// The orientation that Exif gives a picture, in the directory of a TIFF after six bytes of its own; 1 where it does not.
+unsigned ExifOrientation(const jpeg_marker_struct* marker)
+{
+  while (marker && (marker->data_length < 14 || std::memcmp(marker->data, "Exif\0", 6) != 0))
+    marker = marker->next;
+  const auto number = [marker](std::size_t at, unsigned bytes) {
+    unsigned value = 0;
+    for (unsigned i = 0; i < bytes && 6 + at + bytes <= marker->data_length; ++i)
+      value |= unsigned{marker->data[6 + at + i]} << 8 * (marker->data[6] == 'M' ? bytes - 1 - i : i);
+    return value;
+  };
+  const std::size_t directory = marker ? number(4, 4) : 0;
+  for (unsigned i = 0, count = marker ? number(directory, 2) : 0; i < count; ++i)
+    if (number(directory + 2 + 12 * i, 2) == TIFFTAG_ORIENTATION)
+      return number(directory + 10 + 12 * i, 2);
+  return 1;
+}
+
 bool ReadJpeg(FILE* file, PictureInfo* info)
 {
   jpeg_decompress_struct jpeg;
@@ -99,10 +119,14 @@ bool ReadJpeg(FILE* file, PictureInfo* info)
   }
   jpeg_create_decompress(&jpeg);
   jpeg_stdio_src(&jpeg, file);
+  jpeg_save_markers(&jpeg, JPEG_APP0 + 1, 0xFFFF);
   jpeg_read_header(&jpeg, TRUE);
-  const bool grey = jpeg.num_components == 1;
-  bool good = grey || jpeg.num_components == 3;
-  if (!good)
+  const unsigned orientation = ExifOrientation(jpeg.marker_list);
+  const bool grey = jpeg.num_components == 1, turned = orientation > 1 && orientation <= 8;
+  bool good = !turned && (grey || jpeg.num_components == 3);
+  if (turned)
+    std::snprintf(info->message, sizeof info->message, PictureTurned, orientation);
+  else if (!good)
     std::snprintf(info->message, sizeof info->message, "it has %d colour components; 1 or 3 are read", jpeg.num_components);
   else {
     jpeg.out_color_space = grey ? JCS_GRAYSCALE : JCS_RGB;
@@ -191,7 +215,7 @@ bool ReadTiffPage(TIFF* tiff, PictureInfo* info)
   if (bits != 8 && bits != 16 && bits != 32)
     return refuse("it has %d bits per number; 8, 16 and 32 are read", bits);
   if (orientation != ORIENTATION_TOPLEFT)
-    return refuse("it does not begin at its top left (orientation %d): turned or mirrored pictures are not read", orientation);
+    return refuse(PictureTurned, orientation);
   info->isFloat = format == SAMPLEFORMAT_IEEEFP;
   info->isSigned = format == SAMPLEFORMAT_INT;
   if ((info->isFloat && bits != 32) || format > SAMPLEFORMAT_VOID)

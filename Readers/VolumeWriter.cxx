@@ -9,26 +9,13 @@
 #include "Readers/HeaderLines.h"
 #include "Readers/NiftiHeader.h"
 #include <algorithm>
-#include <cctype>
-#include <filesystem>
 #include <fstream>
 #include <vector>
-
-namespace fs = std::filesystem;
 
 namespace echorama {
 namespace {
 
 constexpr std::uint64_t WrittenAtOnce = 1 << 24;
-
-// The extension of a name, in small letters: ".nii.gz" has ".gz".
-std::string ExtensionOf(const std::string& path)
-{
-  std::string extension = fs::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
-}
 
 } // namespace
 
@@ -68,7 +55,7 @@ VolumeWriter::VolumeWriter(const std::string& path, ImageHeader header, bool com
   for (const HeaderField& field : header.fields)
     if (!CanHold(field))
       p.Fail(Error::Kind::BadInput, "the header cannot hold the field \"" + field.first + "\"");
-  const std::string extension = ExtensionOf(path);
+  const std::string extension = LowerExtension(path);
   if (nifti)
     compress = extension == ".gz";
   header.encoding = compress ? ImageHeader::Encoding::Zlib : ImageHeader::Encoding::Raw;

@@ -42,11 +42,6 @@ std::optional<std::string> StringOf(vtkImageData* image, const std::string& name
   return array && array->GetNumberOfValues() == 1 ? std::optional<std::string>(array->GetValue(0)) : std::nullopt;
 }
 
-bool BeginsWith(const std::string& text, const std::string& start)
-{
-  return text.compare(0, start.size(), start) == 0;
-}
-
 bool EndsWith(const std::string& text, const std::string& end)
 {
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
@@ -103,7 +98,7 @@ SequenceContent ContentOf(vtkImageData* image, const std::string& path, std::vec
     const std::string name = field->GetName() ? field->GetName() : "";
     if (TransformOf(image, field)) {
       placed = true;
-    } else if (!IsOurs(image, name) && !BeginsWith(name, FramePrefix)) {
+    } else if (!IsOurs(image, name) && name.rfind(FramePrefix, 0) != 0) {
       const auto text = StringOf(image, name);
       if (text && echorama::CanHold({name, *text})) {
         content.fields.emplace_back(name, *text);
@@ -137,7 +132,7 @@ SequenceFrame FrameOf(vtkImageData* image, double timeStep, bool& placed)
     const std::string name = field->GetName() ? field->GetName() : "";
     if (const auto transform = TransformOf(image, field)) {
       frame.transforms.push_back(*transform);
-    } else if (const auto text = StringOf(image, name); text && BeginsWith(name, FramePrefix)) {
+    } else if (const auto text = StringOf(image, name); text && name.rfind(FramePrefix, 0) == 0) {
       frame.fields.emplace_back(name.substr(FramePrefix.size()), *text);
     }
   }

@@ -60,8 +60,8 @@ protected:
     return Path(name);
   }
 
-  std::string Jpeg(const std::string& name, const std::vector<unsigned char>& pixels, int width, int height,
-                   int channels = 1) const
+  std::string Jpeg(const std::string& name, const std::vector<unsigned char>& pixels, int width, int height, int channels = 1,
+                   const std::string& exif = "") const
   {
     FILE* file = std::fopen(Path(name).c_str(), "wb");
     jpeg_compress_struct jpeg;
@@ -79,6 +79,9 @@ protected:
     jpeg.X_density = 20;
     jpeg.Y_density = 40;
     jpeg_start_compress(&jpeg, TRUE);
+    jpeg_write_marker(&jpeg, JPEG_APP0 + 1, reinterpret_cast<const JOCTET*>("http://ns.adobe.com/xap/1.0/"), 29);
+    if (!exif.empty())
+      jpeg_write_marker(&jpeg, JPEG_APP0 + 1, reinterpret_cast<const JOCTET*>(exif.data()), static_cast<unsigned>(exif.size()));
     while (jpeg.next_scanline < jpeg.image_height) {
       JSAMPROW row = const_cast<unsigned char*>(pixels.data()) + jpeg.next_scanline * static_cast<unsigned>(width * channels);
       jpeg_write_scanlines(&jpeg, &row, 1);
@@ -449,6 +452,16 @@ TEST_F(ImageStackFile, WhatIsNoStackIsRefused)
   t = Tiff();
   t.orientation = ORIENTATION_BOTLEFT;
   Refused(WriteTiff<unsigned char>("a.tif", {Pattern<unsigned char>(5, 4)}, t), "(orientation 4)");
+
+  // A directory of two entries, the second the orientation, in both byte orders; cut short, it says nothing.
+  const std::string little("Exif\0\0II*\0\10\0\0\0\2\0\0\1\4\0\1\0\0\0\24\0\0\0\22\1\3\0\1\0\0\0\6\0\0\0\0\0\0\0", 44),
+      big("Exif\0\0MM\0*\0\0\0\10\0\1\1\22\0\3\0\0\0\1\0\3\0\0\0\0\0\0", 32);
+  const auto grey = Pattern<unsigned char>(5, 4);
+  Refused(Jpeg("a.jpg", grey, 5, 4, 1, little), "(orientation 6)");
+  Refused(Jpeg("a.jpg", grey, 5, 4, 1, big), "(orientation 3)");
+  for (const std::size_t length : {0, 6, 14, 20, 30, 36, 37})
+    EXPECT_NO_THROW(OpenImageStack(Jpeg("a.jpg", grey, 5, 4, 1, little.substr(0, length)))) << length;
+  EXPECT_NO_THROW(OpenImageStack(Jpeg("a.jpg", grey, 5, 4, 1, std::string(little).replace(36, 1, "\1"))));
 
   // Sizes out of all proportion: the width in the header of a PNG, with its checksum.
   std::string png = Bytes(Png("a.png", Pattern<unsigned char>(5, 4), 5, 4));
