@@ -313,19 +313,32 @@ private:
         use(static_cast<Eigen::Index>(i), words[axes[i]]);
       return true;
     };
-    if (!perAxis("spacings", "spacings", [&](Eigen::Index i, std::string_view word) {
-          g.spacing[i] = unit[i] * lines_.Numbers<double>("spacings", word, 1)[0];
-        }))
+    const auto lengths = [&](const char* field, const char* name, Eigen::Vector3d& target) {
+      return perAxis(field, name, [&](Eigen::Index i, std::string_view word) {
+        target[i] = unit[i] * lines_.Numbers<double>(name, word, 1)[0];
+      });
+    };
+    std::array<std::string_view, 3> centers;
+    for (const char* field : {"centers", "centerings"})
+      perAxis(field, field, [&](Eigen::Index i, std::string_view word) { centers[static_cast<std::size_t>(i)] = word; });
+    const bool begins = lengths("axismins", "axis mins", g.origin);
+    Eigen::Vector3d ends;
+    const bool spaced = lengths("spacings", "spacings", g.spacing);
+    const bool ended = begins && !spaced && lengths("axismaxs", "axis maxs", ends);
+    for (std::size_t i = 0; begins && i < axes.size(); ++i) {
+      const bool cell = centers[i] == "cell"; // then the extremes are edges of samples, not their centres
+      if (ended && !cell && centers[i] != "node")
+        lines_.Fail("it has \"axis maxs\" without \"spacings\" or \"centerings\": its spacing is not known");
+      const Eigen::Index axis = static_cast<Eigen::Index>(i);
+      if (const int steps = g.dimensions[i] - (cell ? 0 : 1); ended && steps > 0)
+        g.spacing[axis] = (ends[axis] - g.origin[axis]) / steps;
+      if (cell)
+        g.origin[axis] += 0.5 * g.spacing[axis];
+    }
+    if (!spaced && !ended)
       header_.notes.push_back("the file has no spacing: 1 mm was assumed");
-    if (!perAxis("axismins", "axis mins", [&](Eigen::Index i, std::string_view word) {
-          g.origin[i] = unit[i] * lines_.Numbers<double>("axis mins", word, 1)[0];
-        }))
+    if (!begins)
       header_.notes.push_back("the file has no origin: 0 0 0 was assumed");
-    else
-      // The minimum is the edge of the first sample where samples are cells.
-      for (const char* field : {"centers", "centerings"})
-        perAxis(field, field,
-                [&](Eigen::Index i, std::string_view word) { g.origin[i] += word == "cell" ? 0.5 * g.spacing[i] : 0.0; });
   }
 
   void ParseType()

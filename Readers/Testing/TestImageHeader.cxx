@@ -187,6 +187,39 @@ TEST_F(ImageHeaderTest, NrrdUnitsSpacingsAndCells)
   }
 }
 
+TEST_F(ImageHeaderTest, NrrdSpacingsOfExtremes)
+{
+  Fields fields{{"space", ""},
+                {"space directions", ""},
+                {"space origin", ""},
+                {"axis mins", "10 20 -30.5"},
+                {"axis maxs", "10.5 21 -22.5"},
+                {"centers", "cell node cell"}};
+  const ImageHeader header = Read("e.nrrd", Nrrd(fields));
+  EXPECT_EQ(header.geometry.spacing, Eigen::Vector3d(0.25, 0.5, 2));
+  EXPECT_EQ(header.geometry.origin, Eigen::Vector3d(10.125, 20, -29.5));
+  EXPECT_EQ(header.notes.size(), 1u) << "no direction";
+  fields["spacings"] = "1 2 3";
+  EXPECT_EQ(Read("s.nrrd", Nrrd(fields)).geometry.spacing, Eigen::Vector3d(1, 2, 3));
+  fields["spacings"] = "";
+  fields["units"] = "\"cm\" \"mm\" \"mm\"";
+  EXPECT_EQ(Read("u.nrrd", Nrrd(fields)).geometry.spacing, Eigen::Vector3d(2.5, 0.5, 2));
+  fields["centers"] = "cell ??? cell";
+  Refused("e.nrrd", Nrrd(fields), "its spacing is not known");
+  fields["axis mins"] = "";
+  EXPECT_EQ(Read("e.nrrd", Nrrd(fields)).geometry.spacing, Eigen::Vector3d(1, 1, 1));
+  // A single node has no spacing.
+  EXPECT_EQ(Read("o.nrrd", Nrrd({{"space", ""},
+                                 {"space directions", ""},
+                                 {"space origin", ""},
+                                 {"sizes", "2 3 1"},
+                                 {"axis mins", "0 0 7"},
+                                 {"axis maxs", "1 1 7"},
+                                 {"centerings", "node node node"}}))
+                .geometry.spacing,
+            Eigen::Vector3d(1, 0.5, 1));
+}
+
 TEST_F(ImageHeaderTest, ASpaceWithoutDirectionsIsRefused)
 {
   const Fields plain{{"space directions", ""}, {"spacings", "0.25 0.5 2"}};
