@@ -6,13 +6,11 @@
 #include "Core/Base/FormatText.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Geometry/MatrixRows.h"
+#include "Readers/DataFile.h"
 #include "Readers/DicomElements.h"
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <fstream>
-
-namespace fs = std::filesystem;
 
 namespace echorama {
 namespace {
@@ -142,11 +140,8 @@ public:
 private:
   DicomData Parse()
   {
-    std::error_code error;
-    const std::uint64_t bytes = fs::is_regular_file(path_, error) ? fs::file_size(path_, error) : 0;
-    std::ifstream stream(path_, std::ios::binary);
-    if (error || !stream || !fs::is_regular_file(path_, error))
-      throw Error(Error::Kind::FileSystem, path_ + ": it cannot be opened (is it there, and is reading permitted?)");
+    const std::uint64_t bytes = FileSize(path_);
+    std::ifstream stream = OpenToRead(path_);
     std::string start(DicomPreamble, '\0');
     stream.read(start.data(), static_cast<std::streamsize>(start.size()));
     if (!stream || !LooksLikeDicom(start))

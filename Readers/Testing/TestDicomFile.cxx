@@ -8,6 +8,7 @@
 #include <gdcmImageChangeTransferSyntax.h>
 #include <gdcmImageReader.h>
 #include <gdcmImageWriter.h>
+#include <sys/stat.h>
 
 using namespace echorama;
 using namespace echorama::testing;
@@ -243,6 +244,13 @@ TEST_F(DicomFile, DeflatedDataAreChecked)
 {
   const std::string path = Put("deflated", StartOf("1.2.840.10008.1.2.1.99") + "not deflated");
   ExpectRefused([&] { OpenVolume(path); }, Error::Kind::BadFile, path, "deflated");
+}
+
+TEST_F(DicomFile, APipeIsNotWaitedFor)
+{
+  const std::string path = Path("pipe.dcm");
+  ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
+  ExpectRefused([&] { ReadDicomHeader(path); }, Error::Kind::FileSystem, path, "not a plain one");
 }
 
 TEST_F(DicomFile, OtherFilesOfAFolder)
