@@ -8,12 +8,13 @@
 #include "Tracking/Stream/Clock.h"
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 namespace echorama {
 namespace {
 
 constexpr std::int64_t ManualExposure = 1; // of Video4Linux's auto_exposure
-constexpr double OldestStamp = 1.0;        // s; an older one is of another clock
+constexpr double OldestStamp = 1.0;        // s; an older one is of another clock, unless an earlier one was of ours
 
 } // namespace
 
@@ -126,6 +127,7 @@ CameraFormat LiveCamera::Open()
   isOpen_ = true;
   number_ = -1;
   lost_ = 0;
+  stamp_ = std::numeric_limits<double>::infinity();
   format_ = {mode.width, mode.height, mode.frameRate, exposure, p.rowUs, mode.pixels, p.device};
   return format_;
 }
@@ -143,11 +145,12 @@ CameraSource::Outcome LiveCamera::Next(CameraFrame& frame, double seconds)
     const double age = std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count() - picture.stamp;
     const double delay = 1e-3 * (parameters_.stampMs < 0.0 ? format_.exposureMs : parameters_.stampMs);
     // Without a stamp, or with one of another clock, the moment of arrival has to do.
-    const bool isStamped = age >= 0.0 && age < OldestStamp;
+    const bool isStamped = age >= 0.0 && (age < OldestStamp || picture.stamp >= stamp_);
     const double begin = now - (isStamped ? age : 0.0) - delay;
     if (number_ >= 0 && (!(begin > last_) || (isStamped && picture.stamp == stamp_))) // a frame that came twice
       continue;
-    stamp_ = picture.stamp;
+    if (isStamped)
+      stamp_ = picture.stamp;
     const double period = 1.0 / format_.frameRate;
     const std::int64_t missed = number_ < 0 ? 0 : std::max<std::int64_t>(0, std::llround((begin - last_) / period) - 1);
     lost_ += missed;

@@ -45,7 +45,8 @@ private:
   CameraFormat format_;
   bool isOpen_ = false;
   std::int64_t number_ = -1, lost_ = 0;
-  double last_ = 0.0, stamp_ = 0.0; // begin of the newest frame, and what the driver says of it
+  double last_ = 0.0;  // begin of the newest frame
+  double stamp_ = 0.0; // the newest of the driver's that was of our clock; infinite: none was
 };
 
 } // namespace echorama

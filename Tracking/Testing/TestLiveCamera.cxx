@@ -2,6 +2,7 @@
 // No machine for tests has a camera: the system's calls are replaced by a camera that answers as real ones do, with their moods.
 #include "Core/Base/Error.h"
 #include "Tracking/Cameras/LiveCamera.h"
+#include "Tracking/Cameras/RestUntil.h"
 #include "Tracking/Stream/Clock.h"
 #include <cerrno>
 #include <chrono>
@@ -242,6 +243,31 @@ TEST(LiveCamera, TimesAreOfTheExposureOnOurClockAndGapsAreLostFrames)
   EXPECT_EQ(frame.number, 5);
   EXPECT_EQ(live.Lost(), 2);
   EXPECT_EQ(live.Next(frame, 0.01), Outcome::Nothing);
+}
+
+TEST(LiveCamera, StampsThatWereOfOurClockStaySoHoweverLateAPictureComes)
+{
+  FakeCamera camera;
+  LiveCamera live(Line(), camera.Calls());
+  live.Open();
+  const double stamp = Monotonic(), period = 1.0 / 90.0;
+  camera.stamps = {stamp};
+  CameraFrame frame;
+  ASSERT_EQ(live.Next(frame, 1.0), Outcome::Frame);
+  const double first = frame.begin;
+  ASSERT_TRUE(RestUntil(ClockNow() + 1.2, 10.0)); // nobody asks for pictures, and the driver keeps them
+  camera.stamps = {stamp + period, stamp + period, stamp + 2.0 * period};
+  for (int i = 1; i <= 2; ++i) {
+    ASSERT_EQ(live.Next(frame, 1.0), Outcome::Frame); // the one that came twice is passed over
+    EXPECT_LT(frame.begin - first, 0.6);              // by its arrival it would be twice that
+  }
+  EXPECT_EQ(live.Next(frame, 0.0), Outcome::Nothing);
+  camera.stamps = {stamp - 100.0, stamp - 100.0 + period}; // a clock that went back is ours no more
+  for (int i = 1; i <= 2; ++i) {
+    ASSERT_TRUE(RestUntil(ClockNow() + 0.01, 1.0));
+    ASSERT_EQ(live.Next(frame, 1.0), Outcome::Frame);
+    EXPECT_GT(frame.begin - first, 0.6);
+  }
 }
 
 TEST(LiveCamera, WithoutAUsableStampTheArrivalHasToDo)
