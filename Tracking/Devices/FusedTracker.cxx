@@ -9,6 +9,7 @@
 #include "Core/Geometry/TransformGraph.h"
 #include "Tracking/Devices/RunDevice.h"
 #include "Tracking/Stream/Clock.h"
+#include "Tracking/Stream/ReaderPatience.h"
 #include <cmath>
 #include <deque>
 #include <limits>
@@ -16,7 +17,7 @@
 namespace echorama {
 namespace {
 
-constexpr double lookSeconds = 0.004, silentSeconds = 0.5, stateSeconds = 0.1, patienceSeconds = 10.0;
+constexpr double lookSeconds = 0.004, silentSeconds = 0.5, stateSeconds = 0.1;
 constexpr double agreeSeconds = 10.0; // by how much the clocks of both lines may differ, with what the filter remembers
 constexpr double backSeconds = 1.0;   // a clock that jumped
 
@@ -141,7 +142,7 @@ void FusedTracker::Run(const Worker::Signal& signal, PoseStream& poses)
 {
   Line *const place = position_.get(), *const turn = orientation_.get();
   double told = 0.0;
-  bool readersAreAlive = true;
+  ReaderPatience patience;
   while (!signal.Stopped()) {
     turn->Take(lookSeconds);
     if (place)
@@ -156,12 +157,8 @@ void FusedTracker::Run(const Worker::Signal& signal, PoseStream& poses)
       const ToolPose pose = std::move(next->waiting.front());
       next->waiting.pop_front();
       Use(*next, pose, poses);
-      // Of a recording, those who subscribed lose nothing, but who takes nothing is not waited for for ever.
-      for (const double since = ClockNow(); !isLive_ && readersAreAlive && poses.Backlog() > 0.5;) {
-        if (!signal.Sleep(1e-3))
-          return;
-        readersAreAlive = ClockNow() - since < patienceSeconds;
-      }
+      if (!isLive_ && !patience.Wait(poses, signal))
+        return;
     }
     if (ClockNow() - told > stateSeconds || turn->IsOver() || (place && place->IsOver())) {
       told = ClockNow();

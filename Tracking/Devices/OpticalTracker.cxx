@@ -15,6 +15,7 @@
 #include "Tracking/Devices/RunDevice.h"
 #include "Tracking/Stream/Clock.h"
 #include "Tracking/Stream/ImageStream.h"
+#include "Tracking/Stream/ReaderPatience.h"
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -22,8 +23,7 @@
 namespace echorama {
 namespace {
 
-constexpr double WaitSeconds = 0.02, ShortWait = 1e-3, SilentSeconds = 0.5, ToldSeconds = 0.25, RetrySeconds = 1.0,
-                 ReaderSeconds = 10.0;
+constexpr double WaitSeconds = 0.02, ShortWait = 1e-3, SilentSeconds = 0.5, ToldSeconds = 0.25, RetrySeconds = 1.0;
 constexpr double BrightSeconds = 0.5; // of frames without a usable picture
 constexpr double DeadSeconds = 10.0;  // in which others were seen
 constexpr double Weak = 0.5;          // of the brightness that a light had when it was calibrated
@@ -281,7 +281,6 @@ void OpticalTracker::Start(PoseStream& poses, ImageStream* images)
   }
   sent_ = -1e300;
   disagreements_ = 0;
-  readersAreAlive_ = true;
   poses.SetLive(isLive_);
   poses.SetState(DeviceState::Connecting, "no frame has come yet");
   RunDevice(worker_, poses, [this, &poses](const Worker::Signal& signal) { Run(signal, poses); });
@@ -295,20 +294,10 @@ void OpticalTracker::Stop()
   film_.reset();
 }
 
-// Of recordings, those who subscribed lose nothing, but who takes nothing is not waited for for ever.
-bool OpticalTracker::WaitForReaders(const Worker::Signal& signal, PoseStream& poses)
-{
-  for (const double since = ClockNow(); !isLive_ && readersAreAlive_ && poses.Backlog() > 0.5;) {
-    if (!signal.Sleep(1e-3))
-      return false;
-    readersAreAlive_ = ClockNow() - since < ReaderSeconds;
-  }
-  return true;
-}
-
 void OpticalTracker::Run(const Worker::Signal& signal, PoseStream& poses)
 {
   double told = 0.0;
+  ReaderPatience patience;
   while (!signal.Stopped()) {
     for (const auto& view : views_) {
       // Recordings: the one that is behind goes first.
@@ -341,7 +330,7 @@ void OpticalTracker::Run(const Worker::Signal& signal, PoseStream& poses)
         continue;
       }
       Use(*view, frame, poses);
-      if (!WaitForReaders(signal, poses))
+      if (!isLive_ && !patience.Wait(poses, signal))
         return;
     }
     const bool isOver = std::all_of(views_.begin(), views_.end(), [](const auto& view) { return view->hasEnded; });

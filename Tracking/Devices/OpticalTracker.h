@@ -57,7 +57,6 @@ private:
   struct Filming;
   void OpenViews();
   void Run(const Worker::Signal& signal, PoseStream& poses);
-  bool WaitForReaders(const Worker::Signal& signal, PoseStream& poses);
   void Use(View& view, const CameraFrame& frame, PoseStream& poses);
   void TellTruth(const View& view, double time, PoseStream& poses) const;
   MappedPoint PlaceOf(std::size_t light, double time, Touch& touch);
@@ -71,7 +70,7 @@ private:
   std::vector<Tool> tools_;
   std::unique_ptr<Filming> film_;
   Worker worker_;
-  bool isLive_ = true, readersAreAlive_ = true;
+  bool isLive_ = true;
   double sent_ = 0.0; // time of the newest poses
   std::int64_t disagreements_ = 0;
   ImageStream* images_ = nullptr;

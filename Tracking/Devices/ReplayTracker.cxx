@@ -8,18 +8,12 @@
 #include "Readers/SequencePoses.h"
 #include "Tracking/Devices/RunDevice.h"
 #include "Tracking/Stream/Clock.h"
+#include "Tracking/Stream/ReaderPatience.h"
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
 namespace echorama {
-namespace {
-
-// At speed 0: how full subscriptions may become before it waits for their readers, how often it looks, and how long it waits
-// until it takes them for dead.
-constexpr double HalfFull = 0.5, LookSeconds = 0.001, PatienceSeconds = 10.0;
-
-} // namespace
 
 ParameterList Describe(ReplayParameters& p)
 {
@@ -69,7 +63,6 @@ struct ReplayTracker::Recording {
   double round = 0.0;                    // how often the end was reached
   std::size_t next = 0;
   int shown = -1; // frame, by ShowImage
-  bool readersAreAlive = true;
 
   Recording(const ReplayParameters& p, PoseStream& poseStream, ImageStream* imageStream)
     : parameters(p), poses(poseStream), images(imageStream), log(ReadPoseLog(p.path, p.log))
@@ -175,26 +168,6 @@ struct ReplayTracker::Recording {
     }
   }
 
-  // Waits until those who want every pose have taken enough of them. \returns false when it was stopped.
-  bool WaitForReaders(const Worker::Signal& signal)
-  {
-    double backlog = poses.Backlog();
-    if (backlog <= HalfFull) {
-      readersAreAlive = true;
-      return true;
-    }
-    for (double seen = ClockNow(); readersAreAlive && backlog > HalfFull;) {
-      if (!signal.Sleep(LookSeconds))
-        return false;
-      const double left = poses.Backlog(), now = ClockNow();
-      if (left < backlog)
-        seen = now;
-      readersAreAlive = now - seen < PatienceSeconds;
-      backlog = left;
-    }
-    return true;
-  }
-
   // Hands out the next moment. \returns false at the end, or when the file turns out to be damaged.
   bool Play()
   {
@@ -243,12 +216,13 @@ void ReplayTracker::Start(PoseStream& poses, ImageStream* images)
     return;
   RunDevice(worker_, poses, [recording = recording_.get()](const Worker::Signal& signal) {
     const double begun = ClockNow(), speed = recording->parameters.speed;
+    ReaderPatience patience;
     while (!signal.Stopped() && recording->next < recording->moments.size()) {
       const double wait = speed > 0.0 ? begun + recording->Due() / speed - ClockNow() : 0.0;
       if (wait > 0.0) {
         if (!signal.Sleep(wait))
           return;
-      } else if ((speed == 0.0 && !recording->WaitForReaders(signal)) || !recording->Play()) {
+      } else if ((speed == 0.0 && !patience.Wait(recording->poses, signal)) || !recording->Play()) {
         return;
       }
     }

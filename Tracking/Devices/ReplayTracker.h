@@ -27,8 +27,7 @@ ParameterList Describe(ReplayParameters& p);
 /// A recording, as if it were a tracker: everything that ReadPoseLog reads, and the images of sequences.
 ///
 /// All poses of one time come together. Their times are those of the file; when they come is told by the speed. At speed 0 it
-/// waits for those who subscribed to the poses, so that recorders and servers lose none; one that takes nothing for ten seconds
-/// is waited for no more.
+/// waits for those who subscribed to the poses (ReaderPatience), so that recorders and servers lose none.
 class ReplayTracker : public TrackerDevice {
 public:
   /// \throws Error(InvalidParameter) as Check()

@@ -127,6 +127,23 @@ TEST_F(FusedTrackerTest, RecordingsWithNoiseDelayBiasAndDriftAreFusedAsByTheFilt
   EXPECT_EQ(fused->HeadingSigma() < 0.2, true);
 }
 
+TEST_F(FusedTrackerTest, WhoWasWaitedForInVainIsWaitedForOnceItTakesAgain)
+{
+  SequenceRecorder turns(Path("turns.igs.mha"));
+  for (int i = 0; i < 20; ++i)
+    Append(turns, 0.05 * i, Pose::Identity(), "ImuToLevel");
+  turns.Finish();
+  PoseStream poses;
+  const auto reader = poses.Subscribe(100);
+  const auto fused = Make("fused:|replay:" + Path("turns.igs.mha") + "?speed=50&loop=1|alignTo=1 0 0");
+  fused->Start(poses, nullptr);
+  ASSERT_TRUE(WaitUntil([&] { return reader->Lost() > 0; }, 60.0));
+  reader->Take();
+  const std::uint64_t lost = reader->Lost();
+  EXPECT_TRUE(WaitUntil([&] { return poses.Backlog() > 0.5; }));
+  EXPECT_FALSE(WaitUntil([&] { return reader->Lost() > lost; }, 0.5));
+}
+
 TEST_F(FusedTrackerTest, LiveItIsNotTrustedUntilItsHeadingIsSaid)
 {
   PoseStream poses;

@@ -507,6 +507,26 @@ TEST(OpticalTracker, ACameraThatGoesIsLostAndComesBack)
   EXPECT_EQ(stream.State().first, DeviceState::Idle);
 }
 
+TEST(OpticalTracker, WhoWasWaitedForInVainIsWaitedForOnceItTakesAgain)
+{
+  Rig rig;
+  rig.source.frames = 0; // without an end
+  PoseStream stream;
+  OpticalTracker tracker({}, Views(rig.View()));
+  const auto reader = stream.Subscribe(10);
+  const auto loses = [&](double seconds) {
+    const std::uint64_t lost = reader->Lost();
+    for (const double since = ClockNow(); ClockNow() - since < seconds && reader->Lost() == lost;)
+      stream.WaitBeyond(stream.Version(), 0.02);
+    return reader->Lost() > lost;
+  };
+  tracker.Start(stream, nullptr);
+  ASSERT_TRUE(loses(60.0));
+  reader->Take();
+  EXPECT_FALSE(loses(1.0));
+  EXPECT_GT(stream.Backlog(), 0.5); // it was not the tracker that was slow
+}
+
 // Two cameras that look at one dome from two places.
 Told ListenToTwo(Rig& left, Rig& right)
 {
