@@ -164,6 +164,7 @@ struct ReplayTracker::Recording {
     for (std::size_t i = moment.begin; i < moment.end; ++i) {
       ToolPose pose = log.poses[i];
       pose.time += shift;
+      pose.arrival += shift;
       poses.Add(std::move(pose));
     }
   }

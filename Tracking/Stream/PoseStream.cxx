@@ -181,6 +181,7 @@ private:
 struct Tool {
   Ring samples;
   double clockOffset = 0.0; // largest of late of time minus arrival
+  double taken = 0.0;       // our clock: when the newest was, whatever the arrival that a recording tells
   std::uint64_t byStatus[3] = {0, 0, 0}, clockJumps = 0;
 
   ToolPose Latest(const std::string& name) const
@@ -227,8 +228,6 @@ void Summarize(const Intervals& window, bool live, ToolStatistics& statistics)
   statistics.remembered = count;
   if (!live || (count > 0 && window.latencies.empty()))
     statistics.medianLatencySeconds = statistics.latencySpreadSeconds = unknown;
-  if (count > 0)
-    statistics.secondsSinceLast = ClockNow() - window.arrivals.back();
   if (count < 2)
     return;
   std::vector<double> steps(count - 1), values(count);
@@ -323,6 +322,7 @@ struct PoseStream::Parts {
     }
     tool.clockOffset = first || jumped ? offset : std::max(offset, tool.clockOffset - ClockFading * since);
     ++tool.byStatus[static_cast<std::size_t>(pose.status)];
+    tool.taken = ClockNow();
     tool.samples.Add({pose.time, pose.arrival, pose.pose, pose.status, isTimed}, limits.posesPerTool);
     ++version;
     return true;
@@ -484,6 +484,8 @@ StreamStatistics PoseStream::Statistics() const
       one.missing = tool.byStatus[static_cast<std::size_t>(TransformStatus::Missing)];
       one.outOfRange = tool.byStatus[static_cast<std::size_t>(TransformStatus::OutOfRange)];
       one.clockJumps = tool.clockJumps;
+      if (!tool.samples.Empty())
+        one.secondsSinceLast = ClockNow() - tool.taken;
       Intervals& window = windows.emplace_back();
       window.times.reserve(tool.samples.Size());
       window.arrivals.reserve(tool.samples.Size());

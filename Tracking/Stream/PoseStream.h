@@ -59,7 +59,7 @@ struct ToolStatistics {
   double medianLatencySeconds = 0.0;
   /// 95% of the latencies are below the smallest plus this, whatever the clocks. NaN as above.
   double latencySpreadSeconds = 0.0;
-  double secondsSinceLast = 0.0; ///< on our clock
+  double secondsSinceLast = 0.0; ///< on our clock; of a recording since it was replayed
 
   std::uint64_t Taken() const { return valid + missing + outOfRange; }
   /// Share of poses without a valid measurement, in [0, 1].

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
 #include "Core/Base/FileReplacement.h"
+#include "Core/Base/NumberText.h"
+#include "Readers/PoseLog.h"
 #include "Readers/SequenceWriter.h"
 #include "Tracking/Devices/ReplayTracker.h"
 #include "Tracking/Devices/SimulatedTracker.h"
@@ -168,6 +170,36 @@ TEST_F(ReplayTrackerTest, PartsAndRounds)
     EXPECT_NEAR(history[i].time, 100.2 + 0.05 * static_cast<double>(i), 1e-9);
   EXPECT_EQ(stream.Statistics().Rejected(), 0u);
   EXPECT_EQ(stream.Statistics().tools[0].clockJumps, 0u);
+}
+
+// Recorders write when each pose came: that was on our clock, but long ago.
+TEST_F(ReplayTrackerTest, SinceTheLastIsSinceItWasReplayedAndArrivalsGoOnFromRoundToRound)
+{
+  SequenceContent content;
+  FileReplacement files;
+  SequenceWriter writer(Path("arrivals.igs.mha"), content, false, files);
+  for (int i = 0; i < 3; ++i) {
+    SequenceFrame frame;
+    frame.time = 100.0 + 0.05 * i;
+    frame.transforms.push_back({"ProbeToTracker", Eigen::Affine3d::Identity(), TransformStatus::Valid, "OK"});
+    frame.fields.emplace_back(std::string("ProbeToTracker") + ArrivalField, NumberText(500.0 + 0.05 * i));
+    writer.Append(frame, nullptr);
+  }
+  writer.Finish();
+  files.Commit();
+  PoseStream stream;
+  ReplayTracker device(ReplayParameters::Of(TrackerAddress::Parse("replay:" + Path("arrivals.igs.mha") + "?step=1&loop=1")));
+  device.Start(stream, nullptr);
+  const double begun = ClockNow();
+  for (int i = 0; i < 9; ++i)
+    EXPECT_TRUE(device.Step());
+  const double since = stream.Statistics().tools[0].secondsSinceLast;
+  EXPECT_GE(since, 0.0);
+  EXPECT_LE(since, ClockNow() - begun);
+  const std::vector<ToolPose> history = stream.History("ProbeToTracker");
+  ASSERT_EQ(history.size(), 9u);
+  for (std::size_t i = 0; i < history.size(); ++i)
+    EXPECT_NEAR(history[i].arrival, 500.0 + 0.05 * static_cast<double>(i), 1e-9);
 }
 
 TEST_F(ReplayTrackerTest, SpeedIsKept)
