@@ -2,6 +2,7 @@
 #include "ProbeTracker.h"
 #include "Controls.h"
 #include "Core/Geometry/TransformGraph.h"
+#include "Job.h"
 #include "NeedleTool.h"
 #include "Scan.h"
 #include "TrackerState.h"
@@ -95,6 +96,7 @@ ProbeTracker::ProbeTracker(Scan* scan, NeedleTool* needle, QWidget* parent) : QW
 
 ProbeTracker::~ProbeTracker()
 {
+  delete job_;
   tracker_->Stop();
 }
 
@@ -114,9 +116,12 @@ QString ProbeTracker::Device() const
   return "fused:" + place + "|" + orientation + "|" + options;
 }
 
+// A long log may have to be read for it, or a name to be looked up.
 void ProbeTracker::ConnectOrNot()
 {
-  if (tracker_->GetActive()) {
+  if (job_) {
+    job_->Cancel();
+  } else if (timer_->isActive()) {
     tracker_->Stop();
     timer_->stop();
     tool_->clear();
@@ -129,17 +134,30 @@ void ProbeTracker::ConnectOrNot()
     trackerToBody_ = Pose::Identity();
     slide_.invalidate();
     sinceSeen_.start();
-    if (tracker_->Start()) { // else it has said why
-      isFused_ = !std::isnan(tracker_->GetHeadingSigma());
-      isAlone_ = isFused_ && Device().startsWith("fused:|");
-      GiveNormals();
-      QSettings().setValue("tracker/address", address_->text());
-      QSettings().setValue("tracker/orientation", orientation_->text());
-      QSettings().setValue("tracker/options", options_->text());
-      timer_->start();
-    } else {
-      tracker_->Stop();
-    }
+    job_ = Job::Start(
+        this, tr("Connecting the tracker"), [tracker = tracker_.Get()](const Progress&) { tracker->Start(); }, [] {},
+        [this](const QString& error) {
+          emit scan_->Said({Message::Warning, error, {}});
+        });
+    connect(job_, &Job::Ended, this, &ProbeTracker::Connected);
+    emit JobStarted(job_);
+  }
+  Step();
+}
+
+void ProbeTracker::Connected(bool done)
+{
+  job_ = nullptr;
+  if (done && isEnabled()) { // a task that has begun since then keeps the probe that it began with
+    isFused_ = !std::isnan(tracker_->GetHeadingSigma());
+    isAlone_ = isFused_ && Device().startsWith("fused:|");
+    GiveNormals();
+    QSettings().setValue("tracker/address", address_->text());
+    QSettings().setValue("tracker/orientation", orientation_->text());
+    QSettings().setValue("tracker/options", options_->text());
+    timer_->start();
+  } else {
+    tracker_->Stop();
   }
   Step();
 }
@@ -177,6 +195,8 @@ void ProbeTracker::Slide()
 // A tracker without normals gets those of the skin.
 void ProbeTracker::GiveNormals()
 {
+  if (job_) // it gets them once it is connected
+    return;
   const std::shared_ptr<const SkinMesh> mesh = scan_->Body().mesh;
   if (!mesh) {
     tracker_->SetNormals(nullptr);
@@ -192,12 +212,12 @@ void ProbeTracker::GiveNormals()
 
 void ProbeTracker::ShowHeading()
 {
-  const bool can = tracker_->GetActive() && isFused_;
+  const bool can = timer_->isActive() && isFused_;
   const bool hasCome = can && tracker_->GetNumberOfTools() > 0;
   align_->setEnabled(hasCome);
   slideButton_->setEnabled(hasCome && !isAlone_);
   slideButton_->setText(slide_.isValid() ? tr("It was &slid") : tr("Align by a &slide"));
-  const double sigma = tracker_->GetHeadingSigma();
+  const double sigma = can ? tracker_->GetHeadingSigma() : 0.0;
   const QString text = !can           ? tr("of the tracker")
                        : sigma > 90.0 ? tr("not known: Align")
                                       : tr("known to %1 degrees").arg(sigma, 0, 'f', sigma < 9.95 ? 1 : 0);
@@ -207,15 +227,15 @@ void ProbeTracker::ShowHeading()
 
 void ProbeTracker::Step()
 {
-  const bool active = tracker_->GetActive();
-  connect_->setText(active ? tr("Disconnect") : tr("&Connect"));
-  address_->setEnabled(!active);
-  orientation_->setEnabled(!active);
-  options_->setEnabled(!active);
+  const bool active = timer_->isActive();
+  connect_->setText(active ? tr("Disconnect") : job_ ? tr("Cancel") : tr("&Connect"));
+  address_->setEnabled(!active && !job_);
+  orientation_->setEnabled(!active && !job_);
+  options_->setEnabled(!active && !job_);
   here_->setEnabled(active && hasSeen_ && !isAlone_);
   ShowHeading();
   if (!active) {
-    state_->setText(tr("not connected"));
+    state_->setText(job_ ? tr("connecting") : tr("not connected"));
     return;
   }
   if (isAlone_) {

@@ -14,6 +14,7 @@ class QTimer;
 
 namespace echorama {
 
+class Job;
 class NeedleTool;
 class Scan;
 
@@ -28,8 +29,12 @@ public:
 
   vtkUltrasoundTrackerSource* Tracker() { return tracker_; }
 
+signals:
+  void JobStarted(Job* job);
+
 private:
   void ConnectOrNot();
+  void Connected(bool done);
   QString Device() const;
   void PlaceHere();
   void Align();
@@ -42,7 +47,8 @@ private:
 
   Scan* scan_;
   NeedleTool* needle_;
-  vtkNew<vtkUltrasoundTrackerSource> tracker_;
+  vtkNew<vtkUltrasoundTrackerSource> tracker_; ///< while it is connected, that job's alone
+  Job* job_ = nullptr;                         ///< that connects it
   Pose trackerToBody_ = Pose::Identity();
   Pose seen_ = Pose::Identity();
   bool hasSeen_ = false, isToolChosen_ = false; ///< since it was connected

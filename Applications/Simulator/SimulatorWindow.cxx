@@ -180,6 +180,7 @@ SimulatorWindow::SimulatorWindow(QWidget* parent)
   AddPanel(tracker, tr("Tracker"));
   outputs_ = new OutputPanel(scan_, this);
   connect(outputs_, &OutputPanel::JobStarted, jobs_, &JobBar::Watch);
+  connect(tracker, &ProbeTracker::JobStarted, jobs_, &JobBar::Watch);
   AddPanel(outputs_, tr("Record"));
   tasks_ = new TaskPanel(scan_, needle_, image_, this);
   connect(tasks_, &TaskPanel::RunningChanged, outputs_, &OutputPanel::ForbidReplay);

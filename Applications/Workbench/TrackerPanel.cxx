@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "TrackerPanel.h"
 #include "Controls.h"
-#include "Messages.h"
+#include "Job.h"
 #include "TrackerState.h"
 #include <QComboBox>
 #include <QFormLayout>
@@ -42,29 +42,38 @@ TrackerPanel::TrackerPanel(Workspace& workspace, QWidget* parent) : QWidget(pare
 
 TrackerPanel::~TrackerPanel()
 {
+  delete job_;
   tracker_->Stop();
 }
 
+// A long log may have to be read for it, or a name to be looked up.
 void TrackerPanel::ConnectOrNot()
 {
   SetGrasping(false);
-  if (tracker_->GetActive()) {
+  if (job_) {
+    job_->Cancel();
+  } else if (timer_->isActive()) {
     tracker_->Stop();
     timer_->stop();
     tool_->clear();
   } else {
     tracker_->SetDevice(address_->text().trimmed().toUtf8());
     workspace_.show({Message::Note, {}, {}, objectName()}); // what the last try said
-    const Messages::OfThread messages;
-    const bool isStarted = tracker_->Start();
-    if (const std::string error = messages.Error(); !error.empty())
-      workspace_.show({Message::Warning, QString::fromUtf8(error.c_str()), {}, objectName()});
-    if (isStarted) {
-      QSettings().setValue("tracker/address", address_->text());
-      timer_->start();
-    } else {
-      tracker_->Stop();
-    }
+    job_ = workspace_.Run(
+        this, tr("Connecting the tracker"), [tracker = tracker_.Get()](const Progress&) { tracker->Start(); }, [] {});
+    connect(job_, &Job::Ended, this, &TrackerPanel::Connected);
+  }
+  Step();
+}
+
+void TrackerPanel::Connected(bool done)
+{
+  job_ = nullptr;
+  if (done) {
+    QSettings().setValue("tracker/address", address_->text());
+    timer_->start();
+  } else {
+    tracker_->Stop();
   }
   Step();
 }
@@ -72,19 +81,19 @@ void TrackerPanel::ConnectOrNot()
 void TrackerPanel::SetGrasping(bool grasping)
 {
   const bool letsGo = isGrasping_ && !grasping;
-  isGrasping_ = grasping && tracker_->GetActive();
+  isGrasping_ = grasping && timer_->isActive();
   if (letsGo)
     workspace_.moveByTool(seen_, false);
 }
 
 void TrackerPanel::Step()
 {
-  const bool active = tracker_->GetActive();
-  connect_->setText(active ? tr("Disconnect") : tr("&Connect"));
-  address_->setEnabled(!active);
+  const bool active = timer_->isActive();
+  connect_->setText(active ? tr("Disconnect") : job_ ? tr("Cancel") : tr("&Connect"));
+  address_->setEnabled(!active && !job_);
   grasp_->setEnabled(active && tool_->count() > 0);
   if (!active) {
-    state_->setText(tr("not connected"));
+    state_->setText(job_ ? tr("connecting") : tr("not connected"));
     return;
   }
   tracker_->Update();

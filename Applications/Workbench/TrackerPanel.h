@@ -14,6 +14,8 @@ class QTimer;
 
 namespace echorama {
 
+class Job;
+
 /// Moves what is selected with a tracked tool, as if it were held in the hand (dissertation 4.3): while the button (or the key
 /// G) is held down, the selected volumes follow the tool. One grasp is one edit.
 class TrackerPanel : public QWidget {
@@ -28,11 +30,13 @@ public slots:
 
 private:
   void ConnectOrNot();
+  void Connected(bool done);
   void Step();
 
   Workspace& workspace_;
-  vtkNew<vtkUltrasoundTrackerSource> tracker_;
-  vtkNew<vtkMatrix4x4> seen_; ///< where the tool was seen last while it grasped
+  vtkNew<vtkUltrasoundTrackerSource> tracker_; ///< while it is connected, that job's alone
+  Job* job_ = nullptr;                         ///< that connects it
+  vtkNew<vtkMatrix4x4> seen_;                  ///< where the tool was seen last while it grasped
   QLineEdit* address_;
   QComboBox* tool_;
   QPushButton *connect_, *grasp_;

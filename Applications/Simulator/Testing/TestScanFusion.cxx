@@ -25,6 +25,7 @@ private slots:
   void normalsOfTheToolAreThoseOfTheLine();
   void whatStopsIsSaidWithTheSeconds();
   void linesThatAreNoneAreNamed();
+  void theWindowGoesOnWhileATrackerIsConnected();
 
 private:
   static void Connect(SimulatorUnderTest& window, const QString& place, const QString& orientation, const QString& options = {})
@@ -37,6 +38,7 @@ private:
       window.Type(window.Part<QLineEdit>(name), text);
     }
     window.Part<QPushButton>("trackerConnect")->click();
+    QVERIFY(window.Wait());
   }
   static double DegreesBetween(const Pose& a, const Pose& b) { return RotationAngle(a.inverse() * b) * DegreesPerRadian; }
 };
@@ -232,6 +234,31 @@ void TestScanFusion::linesThatAreNoneAreNamed()
   slide->click();
   QTRY_VERIFY(window.HasMessage("was not slid by 10 mm"));
   QTRY_COMPARE(slide->text().remove('&'), QString("Align by a slide"));
+}
+
+void TestScanFusion::theWindowGoesOnWhileATrackerIsConnected()
+{
+  SimulatorUnderTest window;
+  QVERIFY(window.Open({body::WriteWithBall(Folder())}));
+  Connect(window, "simulated:", "simulated:");
+  auto* connect = window.Part<QPushButton>("trackerConnect");
+  const auto* address = window.Part<QLineEdit>("trackerAddress");
+  const auto text = [connect] { return connect->text().remove('&'); };
+  QCOMPARE(text(), QString("Disconnect"));
+  connect->click();
+  connect->click(); // once more: it goes on at once, and is connected later
+  QCOMPARE(text(), QString("Cancel"));
+  QVERIFY(!address->isEnabled());
+  emit window.Scan().SubjectChanged(); // what has normals is not for it yet
+  QTRY_COMPARE(text(), QString("Disconnect"));
+  connect->click();
+  connect->click();
+  connect->click(); // no, not this one
+  QVERIFY(window.Wait());
+  QCOMPARE(text(), QString("Connect"));
+  QVERIFY(address->isEnabled());
+  QVERIFY(!window.Part<ProbeTracker>("trackerPanel")->Tracker()->GetActive());
+  connect->click(); // and a window that is closed meanwhile waits for it
 }
 
 int main(int argc, char** argv)

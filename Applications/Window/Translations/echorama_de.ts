@@ -2264,12 +2264,24 @@ tempo</translation>
         <translation>Zustand</translation>
     </message>
     <message>
+        <source>Connecting the tracker</source>
+        <translation>Der Tracker wird verbunden</translation>
+    </message>
+    <message>
         <source>Disconnect</source>
         <translation>Trennen</translation>
     </message>
     <message>
+        <source>Cancel</source>
+        <translation>Abbrechen</translation>
+    </message>
+    <message>
         <source>&amp;Connect</source>
         <translation>&amp;Verbinden</translation>
+    </message>
+    <message>
+        <source>connecting</source>
+        <translation>wird verbunden</translation>
     </message>
     <message>
         <source>not connected</source>

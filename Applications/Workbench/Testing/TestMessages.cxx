@@ -102,7 +102,7 @@ void TestMessages::everyWarningHasAWayOut()
   auto* address = window.Part<QLineEdit>("trackerAddress");
   address->setText("replay:" + Folder().filePath("no-recording.mha"));
   window.Part<QPushButton>("trackerConnect")->click();
-  window.Settle();
+  QVERIFY(window.Wait());
   QCOMPARE(expect("no-recording", {"Show panel Tracker"}), nothing);
   // Its button leads there.
   QVERIFY(window.Answer("Show panel Tracker"));

@@ -649,7 +649,16 @@ void TestPanels::aToolThatIsLetGoLeavesVolumes()
   QTest::mouseClick(window.Part<QPushButton>("trackerConnect"), Qt::LeftButton);
   QTRY_VERIFY(!window.Messages().isEmpty());
   address->setText("simulated:");
-  QTest::mouseClick(window.Part<QPushButton>("trackerConnect"), Qt::LeftButton);
+  auto* connect = window.Part<QPushButton>("trackerConnect");
+  const auto text = [connect] { return connect->text().remove('&'); };
+  QTRY_COMPARE(text(), QString("Connect"));
+  connect->click();
+  QCOMPARE(text(), QString("Cancel")); // the window does not wait for it
+  QVERIFY(!address->isEnabled());
+  connect->click();
+  QVERIFY(window.Wait());
+  QCOMPARE(text(), QString("Connect"));
+  connect->click();
   QTRY_VERIFY_WITH_TIMEOUT(window.Part<QPushButton>("trackerGrasp")->isEnabled(), 10000);
   window.Session()->Select(2, true, true);
   const int entries = window.Session()->GetUndoCount();
