@@ -178,9 +178,16 @@ void BodyView::Fit()
   camera->SetFocalPoint(0.0, 0.0, 0.0);
   camera->SetPosition(from.data());
   camera->SetViewUp(up.data());
+  FitToSize();
+  redraw_->Ask();
+}
+
+void BodyView::FitToSize()
+{
   renderer_->ResetCamera();
   renderer_->ResetCameraClippingRange();
-  redraw_->Ask();
+  renderer_->GetActiveCamera()->GetPosition(fittedFrom_.data());
+  std::copy_n(canvas_->renderWindow()->GetSize(), 2, fittedSize_.begin());
 }
 
 void BodyView::ShowProbe()
@@ -228,6 +235,10 @@ void BodyView::DrawNow()
   ShowProbe();
   ShowImage();
   ShowNeedle();
+  // What nobody has turned or zoomed stays fitted; a body may even be there before the view has a size.
+  if (std::equal(fittedFrom_.begin(), fittedFrom_.end(), renderer_->GetActiveCamera()->GetPosition()) &&
+      !std::equal(fittedSize_.begin(), fittedSize_.end(), canvas_->renderWindow()->GetSize()))
+    FitToSize();
   renderer_->ResetCameraClippingRange();
   const Clock::time_point start = Clock::now();
   canvas_->renderWindow()->Render();
@@ -329,6 +340,9 @@ bool BodyView::eventFilter(QObject* object, QEvent* event)
 {
   auto* mouse = static_cast<QMouseEvent*>(event);
   switch (event->type()) {
+  case QEvent::Resize:
+    redraw_->Ask();
+    break;
   case QEvent::MouseButtonPress:
     if (mouse->button() != Qt::LeftButton)
       break;

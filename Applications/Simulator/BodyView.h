@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include <array>
 #include <memory>
 #include <QPoint>
 #include <QWidget>
@@ -45,6 +46,7 @@ protected:
 
 private:
   void ShowSubject();
+  void FitToSize();
   void ShowProbe();
   void ShowImage();
   void ShowNeedle();
@@ -62,7 +64,9 @@ private:
   vtkNew<vtkImageSliceMapper> imageMapper_;
   vtkNew<vtkImageSlice> image_;
   Redraw* redraw_;
-  int waitMs_;         ///< until what has changed is drawn
+  int waitMs_;                         ///< until what has changed is drawn
+  std::array<double, 3> fittedFrom_{}; ///< where the camera was put; and for a view of so many pixels
+  std::array<int, 2> fittedSize_{};
   QString shownProbe_; ///< what the probe's surface was made for
   QPoint last_;
   QPointF grabbed_; ///< from the probe to where it was taken

@@ -71,6 +71,7 @@ private slots:
   void aSlowPictureIsGivenUpForANewPose();
   void whatIsInventedIsColouredOrHidden();
   void closingAsks();
+  void aBodyStaysFittedUntilSomebodyZooms();
   void anImageThatFailsLeavesTheOneBefore();
   void thePicturesOfTheManual();
 };
@@ -762,6 +763,36 @@ void TestSimulator::closingAsks()
   QVERIFY(other.Window().isVisible());
   // With nothing at stake it closes at once.
   QVERIFY(other.Window().close());
+}
+
+void TestSimulator::aBodyStaysFittedUntilSomebodyZooms()
+{
+  SimulatorUnderTest window;
+  QVERIFY(window.Open({body::WriteWithBall(Folder())}));
+  BodyView& view = *window.Window().Body();
+  const auto isSeen = [&] {
+    for (const double x : {-1.0, 1.0})
+      for (const double y : {-1.0, 1.0})
+        for (const double z : {-1.0, 1.0}) {
+          const Eigen::Vector3d corner = body::HalfAxes.cwiseProduct(Eigen::Vector3d(x, y, z));
+          if (!view.Canvas()->rect().contains(view.ToCanvas(corner.data()).toPoint()))
+            return false;
+        }
+    return true;
+  };
+  QVERIFY(isSeen());
+  for (const QSize& size : {QSize(700, 1000), QSize(1500, 700), QSize(1280, 800)}) {
+    window.Window().resize(size);
+    window.Frame();
+    QVERIFY2(isSeen(), qPrintable(QString("%1 x %2").arg(size.width()).arg(size.height())));
+  }
+  for (int i = 0; i < 10; i++)
+    window.Wheel(view.Canvas(), 1);
+  window.Frame();
+  QVERIFY(!isSeen());
+  window.Window().resize(1500, 900);
+  window.Frame();
+  QVERIFY(!isSeen());
 }
 
 void TestSimulator::anImageThatFailsLeavesTheOneBefore()
