@@ -426,7 +426,8 @@ CalibratedSurface ReadSurface(const std::string& path)
   const Json json = described::Parse(path, ReadTextFile(path));
   SurfaceReader::Read(path, none, json, "", keys);
   const std::string meshPath = (std::filesystem::path(path).parent_path() / keys.mesh.file).string();
-  if (!std::filesystem::exists(meshPath))
+  std::error_code unknown; // of a name that no file can have
+  if (!std::filesystem::exists(meshPath, unknown))
     throw Error(Error::Kind::FileSystem, path + ": its mesh " + meshPath + " is missing: both files belong together");
   const std::string mesh = ReadTextFile(meshPath, largestMeshBytes);
   if (Checksum(mesh.data(), mesh.size()) != keys.mesh.checksum)

@@ -140,6 +140,11 @@ TEST_F(SurfaceFile, AMeshThatIsMissingOrAnotherIsRefused)
   ExpectRefused([&] { ReadSurface(Path("s.json")); }, Error::Kind::FileSystem, Path("s.json"),
                 Path("s.mesh.stl") + " is missing");
   ExpectRefused([&] { ReadSurface(Path("t.json")); }, Error::Kind::FileSystem, Path("t.json"), "cannot be read");
+  // Nor is a name that no file can have anything worse than missing.
+  const std::string text = ReadTextFile(Path("s.json")), name = "s.mesh.stl", longName(300, 'm');
+  ASSERT_NE(text.find(name), std::string::npos);
+  Put("s.json", std::string(text).replace(text.find(name), name.size(), longName));
+  ExpectRefused([&] { ReadSurface(Path("s.json")); }, Error::Kind::FileSystem, Path("s.json"), longName + " is missing");
 }
 
 TEST_F(SurfaceFile, DamageIsNamedByItsKey)
