@@ -5,6 +5,7 @@
 #include <QProgressBar>
 #include <QTimer>
 #include <QToolButton>
+#include <utility>
 
 namespace echorama {
 

@@ -10,6 +10,7 @@
 #include <QAction>
 #include <QFileDialog>
 #include <QMenu>
+#include <system_error>
 #include <vector>
 #include <vtkImageData.h>
 #include <vtkNew.h>
@@ -36,8 +37,9 @@ std::vector<std::pair<int, std::string>> FilesFor(vtkUltrasoundAlignmentSession*
     const std::string path = (std::filesystem::path(folder.toStdString()) / (name + "." + extension)).string();
     std::vector<std::string> written = CompanionPaths(path);
     written.push_back(path);
+    std::error_code unknown; // of a name that no file can have: writing it says so
     for (const std::string& each : written)
-      if (std::filesystem::exists(each))
+      if (std::filesystem::exists(each, unknown))
         throw Error(Error::Kind::FileSystem, each + ": it is there already; choose another folder");
     for (const auto& file : files)
       if (file.second == path)

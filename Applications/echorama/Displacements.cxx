@@ -5,6 +5,7 @@
 #include "Readers/VtkXmlFile.h"
 #include <algorithm>
 #include <filesystem>
+#include <system_error>
 #include <vtkErrorCode.h>
 #include <vtkInformation.h>
 #include <vtkNew.h>
@@ -19,7 +20,8 @@ namespace {
 
 vtkSmartPointer<vtkImageData> ReadDisplacement(Session& session, const std::string& path)
 {
-  if (!std::filesystem::exists(path))
+  std::error_code unknown; // of a name that no file can have
+  if (!std::filesystem::exists(path, unknown))
     throw Error(Error::Kind::FileSystem, path + ": a displacement that the poses name is not there");
   CheckVtkXmlFile(path);
   const vtkNew<vtkXMLImageDataReader> reader;
