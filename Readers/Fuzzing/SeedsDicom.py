@@ -42,16 +42,17 @@ def file(syntax, data):
     return bytes(128) + b"DICM" + explicit(2, 0x10, "UI", syntax) + data
 
 
-def image(e, frames=1, kind=b"1.2.840.10008.5.1.4.1.1.6.1", before=b"", increment=b"", after=b"", photometric=b"MONOCHROME2"):
+def image(e, frames=1, kind=b"1.2.840.10008.5.1.4.1.1.6.1", before=b"", increment=b"", after=b"", photometric=b"MONOCHROME2",
+          bits=8, depth=1, spacing=b"0.5\\0.25"):
     samples = 1 if photometric.startswith(b"MONO") else 3
     short = lambda n: struct.pack("<H", n)
     return (e(8, 0x16, "UI", kind) + e(8, 0x60, "CS", b"US") + before + e(0x20, 0xE, "UI", b"1.2.3") +
             e(0x28, 2, "US", short(samples)) + e(0x28, 4, "CS", photometric) +
             (e(0x28, 8, "IS", b"%d" % frames) if frames > 1 else b"") + increment + e(0x28, 0x10, "US", short(3)) +
-            e(0x28, 0x11, "US", short(4)) + e(0x28, 0x30, "DS", b"0.5\\0.25") + e(0x28, 0x100, "US", short(8)) +
-            e(0x28, 0x101, "US", short(8)) + e(0x28, 0x102, "US", short(7)) + e(0x28, 0x103, "US", short(0)) +
-            e(0x28, 0x1052, "DS", b"1") + e(0x28, 0x1053, "DS", b"2") + after +
-            e(0x7FE0, 0x10, "OB", bytes(range(12 * samples)) * frames))
+            e(0x28, 0x11, "US", short(4)) + (e(0x28, 0x30, "DS", spacing) if spacing else b"") +
+            e(0x28, 0x100, "US", short(bits)) + e(0x28, 0x101, "US", short(bits)) + e(0x28, 0x102, "US", short(bits - 1)) +
+            e(0x28, 0x103, "US", short(0)) + e(0x28, 0x1052, "DS", b"1") + e(0x28, 0x1053, "DS", b"2") + after +
+            e(0x7FE0, 0x10, "OB", bytes(range(12 * samples * bits // 8)) * frames * depth))
 
 
 def compressed(syntax, *fragments):
@@ -61,13 +62,16 @@ def compressed(syntax, *fragments):
     return (whole[:pixels] + tag(0x7FE0, 0x10) + b"OB\0\0" + struct.pack("<I", UNDEFINED) + item(b"") + b"".join(map(item, fragments)) + END)
 
 
-def groups(e, item, length):
+def groups(e, item, length, patient=False):
     end = END if length else b""
     sequence = lambda group, element, value: e(group, element, "SQ", item(value) + end, length)
     doubles = lambda *n: struct.pack(f"<{len(n)}d", *n)
     shared = (sequence(0x18, 0x9807, e(0x18, 0x9808, "CS", b"TISSUE_INTENSITY")) +
               sequence(0x20, 0x930F, e(0x20, 0x9302, "FD", doubles(0, 1, 0, 0, 0, 1))) +
               sequence(0x28, 0x9110, e(0x28, 0x30, "DS", b"0.5\\0.25")))
+    if patient:
+        shared += (sequence(0x20, 0x9113, e(0x20, 0x32, "DS", b"1\\2\\3")) +
+                   sequence(0x20, 0x9116, e(0x20, 0x37, "DS", b"1\\0\\0\\0\\1\\0")))
     own = [sequence(0x20, 0x930E, e(0x20, 0x9301, "FD", doubles(k // 2, 2, 3))) +
            sequence(0x20, 0x9310, e(0x20, 0x930D, "FD", doubles(k % 2))) for k in range(4)]
     return (e(0x5200, 0x9229, "SQ", item(shared) + end, length) +
@@ -82,6 +86,12 @@ philips = (explicit(0x18, 0x602C, "FD", struct.pack("<d", 0.1)) + explicit(0x18,
            explicit(0x18, 0x1063, "DS", b"40"))
 philips_after = (explicit(0x3001, 0x10, "LO", b"someone") + explicit(0x3001, 0x1001, "UL", struct.pack("<I", 2)) +
                  explicit(0x3001, 0x1003, "FD", struct.pack("<d", 0.3)))
+region = explicit(0x18, 0x6014, "US", b"\1\0") + explicit(0x18, 0x6024, "US", b"\3\0")
+region += explicit(0x18, 0x6026, "US", b"\3\0") + philips[:32]
+regions = explicit(0x18, 0x6011, "SQ", open_item(region) * 2 + END, UNDEFINED)
+affiniti = explicit(0x200D, 0x10, "LO", b"other") + explicit(0x200D, 0x11, "LO", b"Philips US Imaging DD 036")
+affiniti += explicit(0x200D, 0x1103, "LO", b"0.5\\0.25\\2")
+moment = explicit(0x18, 0x1060, "DS", b"40") + SLICE(explicit) + explicit(0x20, 0x100, "IS", b"2")
 packer = zlib.compressobj(wbits=-15)
 seeds = {
     "slice": file(b"1.2.840.10008.1.2.1", image(explicit, before=SLICE(explicit))),
@@ -96,7 +106,12 @@ seeds = {
     "jpeg2000": compressed(b"1.2.840.10008.1.2.4.90", b"\xff\x4f\xff\x51" + bytes(12)),
     "cine": file(b"1.2.840.10008.1.2.1", image(explicit, 3, increment=explicit(0x28, 9, "AT", tag(0x18, 0x1063)))),
     "stack": file(b"1.2.840.10008.1.2.1", image(explicit, 3, before=explicit(0x18, 0x88, "DS", b"2"))),
-    "philips": file(b"1.2.840.10008.1.2.1", image(explicit, 4, before=philips, after=philips_after)),
+    "placed": file(b"1.2.840.10008.1.2.1", image(explicit, 3, before=explicit(0x18, 0x88, "DS", b"2") + SLICE(explicit))),
+    "philips": file(b"1.2.840.10008.1.2.1", image(explicit, 4, before=philips, after=philips_after, depth=2)),
+    "regions": file(b"1.2.840.10008.1.2.1", image(explicit, before=regions, spacing=b"")),
+    "affiniti": file(b"1.2.840.10008.1.2.1", image(explicit, 3, after=affiniti)),
+    "inverted": file(b"1.2.840.10008.1.2.1", image(explicit, before=moment, photometric=b"MONOCHROME1", bits=16)),
+    "subsampled": file(b"1.2.840.10008.1.2.1", image(explicit, photometric=b"YBR_FULL_422")),
     "kretz": file(b"1.2.840.10008.1.2.1", image(explicit) + explicit(0x7FE1, 0x11, "LO", b"KRETZ_US") +
                   explicit(0x7FE1, 0x1101, "OB", b"KRETZFILE 1.0   " + struct.pack("<HHI", 0xFFFF, 0xFFFF, 0))),
 }
