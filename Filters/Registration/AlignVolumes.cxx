@@ -432,11 +432,13 @@ AlignVolumesResult AlignVolumesRun::Run(const Progress& progress)
     result = Report();
     const PairOfVolumes& pair = result.pairs.front();
     VolumeAlignment& moving = result.volumes[Index(pair.moving)];
-    moving.volumeToWorld = pair.alignment.volumeToWorld;
     moving.verdict = pair.alignment.verdict;
     moving.reason = pair.alignment.reason;
-    moving.information = pair.alignment.information;
-    moving.centre = pair.alignment.centre;
+    if (moving.verdict != Verdict::Failed) { // else it stays where it was
+      moving.volumeToWorld = pair.alignment.volumeToWorld;
+      moving.information = pair.alignment.information;
+      moving.centre = pair.alignment.centre;
+    }
   } else {
     const double middle = first.sure.empty() ? 0.1 : 0.4;
     TryAll(first.sure, p_.pair.start, Start(), progress.Part(0.1, middle));

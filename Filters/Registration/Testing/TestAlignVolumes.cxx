@@ -490,6 +490,8 @@ TEST(AlignVolumes, TwoVolumesAreAPair)
   EXPECT_EQ(result.volumes[1].verdict, Verdict::Failed);
   EXPECT_EQ(result.volumes[1].reason, "told so");
   EXPECT_EQ(result.pairs[0].reason, "told so");
+  EXPECT_EQ(result.volumes[1].volumeToWorld.matrix(), ring.starts[1].matrix());
+  EXPECT_TRUE(result.volumes[1].information.isZero());
 }
 
 TEST(AlignVolumes, VolumesThatCannotBeAlignedFailForThemselves)

@@ -209,6 +209,10 @@ greedy = aligner(a, wrong)
 greedy.SetMinimumOverlap(0.98)
 assert errors_of(greedy) == "" and greedy.GetVerdict(1) == "failed" and greedy.GetReason(1)
 assert np.array_equal(geometry(greedy.GetOutput().GetBlock(1)), geometry(wrong)), "a volume that fails stays where it was"
+strict = aligner(a, wrong)  # its pose is found, and then refused
+strict.SetMinimumSimilarity(1)
+assert errors_of(strict) == "" and strict.GetVerdict(1) == "failed" and "more similar" in strict.GetReason(1)
+assert np.array_equal(geometry(strict.GetOutput().GetBlock(1)), geometry(wrong)), "a volume that fails stays where it was"
 none = aligner(a, wrong)
 none.SetFixedVolume(2)
 assert "fixed volume must be one of the 2" in errors_of(none)
