@@ -34,6 +34,8 @@ VolumeView<const unsigned char> BothMasks(VolumeView<const unsigned char> own, V
 {
   if (own.Empty() || sector.Empty())
     return own.Empty() ? sector : own;
+  if (own.Dimensions() != sector.Dimensions())
+    throw Error(Error::Kind::BadInput, "the mask of a frame has another size than the sector");
   if (store.Dimensions() != sector.Dimensions())
     store = Volume<unsigned char>(sector.Dimensions());
   std::transform(own.begin(), own.end(), sector.begin(), store.View().begin(),

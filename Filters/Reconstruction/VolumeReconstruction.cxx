@@ -25,6 +25,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -177,7 +178,8 @@ struct VolumeReconstruction<T>::Body {
   bool LinearRow(const Plane<T>& plane, const PixelSpan& span, int axis, int lower, int upper, float* values,
                  Zeroed<Cell>& target);
   void LayOver(Cell& cell, Cell& fresh) const;
-  bool Blend(const ReconstructionFrame<T>& a, const ReconstructionFrame<T>& b);
+  /// \returns whether voxels between them were reached; nothing where both lie beside the grid
+  std::optional<bool> Blend(const ReconstructionFrame<T>& a, const ReconstructionFrame<T>& b);
   void Write(int axis, int lower, int upper, const int* from, const int* to);
 };
 
@@ -452,7 +454,7 @@ Eigen::Affine3d IndexToFoot(const Eigen::Affine3d& imageToWorld, const Eigen::Af
 } // namespace
 
 template <class T>
-bool VolumeReconstruction<T>::Body::Blend(const ReconstructionFrame<T>& a, const ReconstructionFrame<T>& b)
+std::optional<bool> VolumeReconstruction<T>::Body::Blend(const ReconstructionFrame<T>& a, const ReconstructionFrame<T>& b)
 {
   Eigen::AlignedBox3d box;
   for (const ReconstructionFrame<T>* frame : {&a, &b})
@@ -465,7 +467,7 @@ bool VolumeReconstruction<T>::Body::Blend(const ReconstructionFrame<T>& a, const
     to[axis] = static_cast<int>(
         std::clamp(std::ceil(box.max()[axis]) + 1.0, 0.0, static_cast<double>(grid.dimensions[static_cast<std::size_t>(axis)])));
     if (from[axis] >= to[axis])
-      return false;
+      return std::nullopt;
   }
   const Eigen::Affine3d footA = IndexToFoot(a.imageToWorld, grid.IndexToWorld());
   Eigen::Affine3d footB = IndexToFoot(b.imageToWorld, grid.IndexToWorld());
@@ -617,9 +619,12 @@ FrameUse VolumeReconstruction<T>::Add(const TrackedFrame<T>& frame)
   const double step = neighbours ? LargestStep(body.previous, body.current) : 0.0;
   const bool joined = neighbours && between != BetweenFrames::Nothing && step <= body.parameters.maximumGapMm &&
                       (between == BetweenFrames::Backward || step <= mostParts * body.parameters.stepMm);
-  bool reached = false;
+  bool reached = false, used = false;
   if (joined && between == BetweenFrames::Backward) {
-    reached = body.Blend(body.previous, body.current);
+    const std::optional<bool> blended = body.Blend(body.previous, body.current);
+    reached = blended.value_or(false);
+    // Two frames in one place have nothing between them, and are none the worse for that.
+    used = blended.has_value();
     body.between += reached;
   } else {
     // Those in between first, then the frame itself.
@@ -648,14 +653,13 @@ FrameUse VolumeReconstruction<T>::Add(const TrackedFrame<T>& frame)
       plane.map = MapOf(toIndex * pose);
       planes.push_back(plane);
     }
-    reached = body.Splat(planes);
+    reached = used = body.Splat(planes);
     body.between += reached ? parts - 1 : 0;
   }
   std::swap(body.previous, body.current);
   body.hasPrevious = true;
-  body.used += reached || (joined && between == BetweenFrames::Backward);
-  // Two frames in one place have nothing between them, and are none the worse for that.
-  return reached || (joined && between == BetweenFrames::Backward) ? FrameUse::Used : FrameUse::Outside;
+  body.used += used;
+  return used ? FrameUse::Used : FrameUse::Outside;
 }
 
 template <class T>

@@ -503,8 +503,12 @@ bool vtkUltrasoundVolumeReconstructor::AddFrame(vtkImageData* image)
       this->Refuse("its pixels are not of the type of the live volume");
       return;
     }
+    if (const echorama::FrameUse placed = echorama::CheckPose(*pose); placed != echorama::FrameUse::Used) {
+      this->Refuse(echorama::FrameUseText(placed));
+      return;
+    }
     const std::array<int, 3> size = vtkUltrasoundVolume::GeometryOf(image).dimensions;
-    if ((!live.Sector || live.Sector->Dimensions() != size) && echorama::CheckPose(*pose) == echorama::FrameUse::Used) {
+    if (!live.Sector || live.Sector->Dimensions() != size) {
       live.Sector = echorama::GivenSector(this->GivenSector(), size, *pose);
     }
     echorama::Volume<unsigned char> store;

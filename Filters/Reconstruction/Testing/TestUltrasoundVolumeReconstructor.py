@@ -305,6 +305,12 @@ def test_live_is_as_the_whole():
     live.SetRectangle(10, 20, 5, 15)
     assert live.BeginLive(grid, VTK_FLOAT) and live.AddFrame(frame(images[0].astype(np.float32), poses[0]))
     assert 0 < (array(live.GetLiveOutput(), "ValidRegion") > 0).sum() < 200
+    # The scanner changes its format while the tracker has lost the probe: refused, and the sector is that of the next one with a pose.
+    larger = np.ones((80, 100), np.float32)
+    refused = live.GetFramesRefused()
+    assert not live.AddFrame(frame(larger, np.zeros((4, 4))))
+    assert live.GetFramesRefused() == refused + 1 and "singular" in live.GetReport() and not heard, (live.GetReport(), heard)
+    assert live.AddFrame(frame(larger, poses[0])), live.GetReport()
     heard.clear()
     assert not live.BeginLive(vtkImageData()) and heard
     assert not live.BeginLive(None)

@@ -494,6 +494,25 @@ TEST(VolumeReconstruction, FramesThatCannotBeUsedLeaveTheVolumeAlone)
   EXPECT_TRUE(before == result);
 }
 
+TEST(VolumeReconstruction, BackwardFramesBesideTheGridAreNotUsed)
+{
+  const ImageGeometry grid = Grid(12, 10, 3);
+  Result<unsigned char> result(grid);
+  ReconstructionParameters parameters = Plain();
+  parameters.between = BetweenFrames::Backward;
+  parameters.maximumGapMm = 10.0;
+  VolumeReconstruction<unsigned char> reconstruction(parameters, grid, result.Output());
+  Image<unsigned char> frame = Noise<unsigned char>(12, 10, 3);
+  frame.pose.translation()[0] += 1000.0;
+  for (int k = 0; k < 3; ++k, frame.pose.translation()[2] += 1.0)
+    EXPECT_EQ(reconstruction.Add(frame.Frame()), FrameUse::Outside) << k;
+  EXPECT_EQ(reconstruction.FramesUsed(), 0);
+  // In the grid, two in one place have nothing between them and are none the worse.
+  frame = Noise<unsigned char>(12, 10, 3);
+  for (int k = 0; k < 2; ++k)
+    EXPECT_EQ(reconstruction.Add(frame.Frame()), FrameUse::Used) << k;
+}
+
 TEST(VolumeReconstruction, AGridSmallerThanTheFramesTakesWhatIsInIt)
 {
   const auto sweep = Sweep<unsigned char>(20);
