@@ -67,7 +67,8 @@ bool Announced(vtkInformation* information, echorama::ImageGeometry& geometry)
 
 //----------------------------------------------------------------------------
 struct vtkUltrasoundStitcher::Scene {
-  vtkMTimeType Made = 0; // of the parameters and of all that came in
+  // All that the plan is made of, which lives as long as it does, and when each was changed last; null: the parameters.
+  std::vector<std::pair<vtkSmartPointer<vtkObject>, vtkMTimeType>> MadeOf;
   std::vector<vtkUltrasoundVolume::Input> Volumes;
   std::vector<echorama::DisplacementField> Fields;
   std::vector<echorama::StitchInput> Stitched;
@@ -191,10 +192,11 @@ std::unique_ptr<vtkUltrasoundStitcher::Scene> vtkUltrasoundStitcher::Collect(vtk
     names.push_back(volume.Name);
   }
   scene->Fields = vtkUltrasoundDisplacement::FieldsOf(inputs[1], names);
-  scene->Made = this->GetMTime();
+  const auto keep = [&scene](vtkObject* part) { scene->MadeOf.emplace_back(part, part->GetMTime()); };
+  scene->MadeOf.emplace_back(nullptr, this->GetMTime());
   for (int port = 0; port < 2; ++port) {
     for (int connection = 0; connection < inputs[port]->GetNumberOfInformationObjects(); ++connection) {
-      scene->Made = std::max(scene->Made, vtkDataObject::GetData(inputs[port], connection)->GetMTime());
+      keep(vtkDataObject::GetData(inputs[port], connection));
     }
   }
   for (const vtkUltrasoundVolume::Input& volume : scene->Volumes) {
@@ -209,7 +211,8 @@ std::unique_ptr<vtkUltrasoundStitcher::Scene> vtkUltrasoundStitcher::Collect(vtk
     scene->Geometries.push_back(vtkUltrasoundVolume::GeometryOf(volume.Image));
     scene->Reaches.push_back(echorama::ReachOf(stitched));
     scene->Type = CommonType(scene->Type, volume.Intensity->GetDataType());
-    scene->Made = std::max({scene->Made, volume.Image->GetMTime(), volume.Intensity->GetMTime()});
+    keep(volume.Image);
+    keep(volume.Intensity);
   }
   scene->Grid = echorama::StitchGrid(scene->Geometries, this->SpacingMm);
   scene->Outputs = this->Wanted;
@@ -244,7 +247,7 @@ void vtkUltrasoundStitcher::Execute(vtkInformationVector** inputs, vtkImageData*
 
   // 2. the plan, new or that of the piece before
   double planned = 0.0;
-  if (this->Kept && this->Kept->Made == scene->Made) {
+  if (this->Kept && this->Kept->MadeOf == scene->MadeOf) {
     scene = std::move(this->Kept);
   } else {
     this->Kept.reset();

@@ -211,6 +211,25 @@ def test_information_and_pieces():
     assert not messages, messages
 
 
+def test_a_plan_is_that_of_the_volumes_that_come():
+    """Volumes that are older than the filter, put in the place of others upstream, between two pieces."""
+    a, b, common = (volume(np.full((6, 20, 30), value, np.uint8), origin) for value, origin in ((50, (0, 0, 0)), (150, (0, 0, 0)), (90, (20, 0, 0))))
+    producer, filter = vtkTrivialProducer(), vtkUltrasoundStitcher()
+    messages = watch(filter)
+    producer.SetOutput(a)
+    filter.AddInputConnection(producer.GetOutputPort())
+    filter.AddInputDataObject(common)
+    filter.UpdateInformation()
+    whole = filter.GetOutputInformation(0).Get(Pipeline.WHOLE_EXTENT())
+    halves = [(*whole[:4], *part) for part in ((0, 2), (3, 5))]
+    filter.UpdateExtent(halves[0])
+    assert (array(filter.GetOutput())[:, :, :15] == 50).all()
+    producer.SetOutput(b)
+    filter.UpdateExtent(halves[1])
+    assert (array(filter.GetOutput())[:, :, :15] == 150).all(), "the piece is of the volume that was there before"
+    assert not messages, messages
+
+
 def test_methods_and_parameters():
     filter = vtkUltrasoundStitcher()
     assert filter.GetMethodAsString() == "membrane" and filter.GetTextureAsString() == "split"
