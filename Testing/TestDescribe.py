@@ -177,6 +177,14 @@ class Slicer(unittest.TestCase):
         sharpness = kinds["sharpness"].find("constraints")
         self.assertEqual(sharpness.findtext("minimum"), "0")
 
+    def as_it_came(self, *command):
+        words = []
+        for parameter in parameters(form(*command)):
+            default, flag = parameter.findtext("default"), parameter.findtext("longflag")
+            if flag and default and parameter.tag != "boolean":
+                words += [flag, default]
+        return words
+
     def test_a_form_that_is_sent_as_it_came_changes_nothing(self):
         # Slicer gives every field that is not empty.
         with tempfile.TemporaryDirectory() as folder:
@@ -184,11 +192,7 @@ class Slicer(unittest.TestCase):
             for i in range(2):
                 write_mha(folder / f"{i}.mha", blobs(seed=3 + i), spacing=(1.5, 1.5, 1.5), origin=(4.0 * i, 0, 0))
             for command, inputs in (("stitch", ["0.mha", "1.mha"]), ("embed", ["0.mha"]), ("noise", []), ("convert", ["0.mha", "form.nrrd"])):
-                words = []
-                for parameter in parameters(form(command)):
-                    default, flag = parameter.findtext("default"), parameter.findtext("longflag")
-                    if flag and default and parameter.tag != "boolean":
-                        words += [flag, default]
+                words = self.as_it_came(command)
                 outputs = [folder / "plain.nrrd", folder / "form.nrrd"]
                 for output, extra in zip(outputs, ([], words)):
                     files = [folder / (output.name if name == "form.nrrd" else name) for name in inputs]
@@ -198,6 +202,19 @@ class Slicer(unittest.TestCase):
                 self.assertEqual(outputs[0].read_bytes(), outputs[1].read_bytes(), command)
                 for output in outputs:
                     output.unlink()
+
+    def test_a_form_that_is_sent_as_it_came_is_not_misused(self):
+        """It gets as far as without: to a file that is not there."""
+        with tempfile.TemporaryDirectory() as folder:
+            missing, out = pathlib.Path(folder) / "missing.mha", pathlib.Path(folder) / "out.json"
+            for command, given in ((["align"], [missing, missing, "-o", out]), (["align"], [missing, missing, "-o", out, "--apply", folder + "/moved"]),
+                                   (["probe-fit"], [missing]), (["synthesize"], [missing, "-o", folder + "/made"]),
+                                   (["calibrate", "hand-eye"], ["--volumes", missing, missing, missing, "--tracker", missing, "-o", out]),
+                                   (["calibrate", "surface"], [f"recording:{missing}", "--check", missing])):
+                plain, sent = (run(*command, *given, *more) for more in ([], self.as_it_came(*command)))
+                self.assertEqual(plain.returncode, 1, plain.stderr)
+                self.assertIn(missing.name, plain.stderr)
+                self.assertEqual((sent.returncode, sent.stderr), (1, plain.stderr), command)
 
     def test_nothing_else_has_a_form(self):
         for words in (["--xml"], ["calibrate", "--xml"], ["banana", "--xml"], ["align", "--completion"]):

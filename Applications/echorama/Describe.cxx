@@ -108,6 +108,36 @@ std::string Label(std::string name)
   return name;
 }
 
+// What an option is for, among what it chooses, and what it is by itself.
+std::string HelpOf(const CLI::Option* option)
+{
+  std::string help = option->get_description();
+  const std::vector<std::string> choices = ChoicesOf(option);
+  if (!ParameterOf(option)) // whose help names them
+    for (const std::string& choice : choices)
+      help += (&choice == &choices.front() ? " (" : ", ") + choice + (&choice == &choices.back() ? ")" : "");
+  if (!option->get_default_str().empty())
+    help += " [" + option->get_default_str() + "]";
+  return help;
+}
+
+bool BeginsWithNumber(const std::string& text)
+{
+  char* end = nullptr;
+  std::strtod(text.c_str(), &end);
+  return end != text.c_str();
+}
+
+// A form gives each field that is not empty. Empty must be what would ask for another option, or refuse one, and what says its
+// default in words.
+bool IsEmptyInForms(const CLI::Option* option)
+{
+  const Parameter* parameter = ParameterOf(option);
+  const bool isText = !parameter || std::holds_alternative<std::string*>(parameter->value) || !ChoicesOf(option).empty();
+  return !option->get_needs().empty() || !option->get_excludes().empty() ||
+         (!isText && !BeginsWithNumber(option->get_default_str()));
+}
+
 // The element of an option. A number without a default is a text there: an empty field is not given, a zero would be.
 std::string SlicerType(const CLI::Option* option)
 {
@@ -120,12 +150,14 @@ std::string SlicerType(const CLI::Option* option)
     return "file";
   if (type == "FOLDER")
     return "directory";
+  if (IsEmptyInForms(option))
+    return "string";
   if (!ChoicesOf(option).empty())
     return "string-enumeration";
+  if (!BeginsWithNumber(given))
+    return "string";
   char* end = nullptr;
   std::strtod(given.c_str(), &end);
-  if (given.empty() || end == given.c_str())
-    return "string";
   const Parameter* parameter = ParameterOf(option);
   if (option->get_items_expected_max() > 1)
     return *end == ' ' || *end == ',' ? "double-vector" : "string";
@@ -162,12 +194,13 @@ std::string SlicerParameter(const CLI::Option* option, int& index)
     text += Element("index", std::to_string(index++));
   else
     text += Element("longflag", "--" + identifier);
-  text += Element("description", option->get_description()) + Element("label", Label(name));
+  const bool isEmpty = type == "string" && IsEmptyInForms(option);
+  text += Element("description", isEmpty ? HelpOf(option) : option->get_description()) + Element("label", Label(name));
   std::string given = type == "boolean" ? "false" : option->get_default_str();
   if (type == "double-vector")
     for (char& letter : given)
       letter = letter == ' ' ? ',' : letter;
-  if (!given.empty() && !isFile)
+  if (!given.empty() && !isFile && !isEmpty)
     text += Element("default", given);
   if (isFile)
     text += Element("channel", Written.count(name) ? "output" : "input");
@@ -193,14 +226,8 @@ std::vector<ManEntry> OptionEntries(const CLI::App& app)
     for (const std::string& name : option->get_snames())
       entry.name += "-" + name + ", ";
     entry.name += option->get_lnames().empty() ? option->get_name(true) : "--" + option->get_lnames().front();
-    const std::vector<std::string> choices = ChoicesOf(option);
     entry.value = IsFlag(option) || option->get_positional() ? "" : TypeOf(option);
-    entry.help = option->get_description();
-    if (!choices.empty() && !ParameterOf(option)) // whose help names them
-      for (const std::string& choice : choices)
-        entry.help += (&choice == &choices.front() ? " (" : ", ") + choice + (&choice == &choices.back() ? ")" : "");
-    if (!option->get_default_str().empty())
-      entry.help += " [" + option->get_default_str() + "]";
+    entry.help = HelpOf(option);
     entry.several = IsMultiple(option);
     entries.push_back(std::move(entry));
   }
