@@ -102,14 +102,18 @@ private:
   std::ptrdiff_t valid_ = 0, shared_ = 0;
 };
 
-// How visible the seams are, and how much texture was kept.
-void TellQuality(Session& session, vtkImageData* stitched, const std::vector<LoadedVolume>& volumes)
+StitchQualityReport QualityOf(Session& session, vtkImageData* stitched, const std::vector<LoadedVolume>& volumes)
 {
   vtkNew<vtkUltrasoundStitchQuality> quality;
   quality->SetInputData(stitched);
   quality->AddSourceData(BlocksOf(volumes));
   session.Update(quality, "quality");
-  const StitchQualityReport& report = quality->Measured();
+  return quality->Measured();
+}
+
+// How visible the seams are, and how much texture was kept.
+void TellQuality(Session& session, const StitchQualityReport& report)
+{
   session.result["quality"] = ToJson(report);
   const auto text = [](double number) { return std::isfinite(number) ? Fixed(number, 2) : std::string("not measurable"); };
   session.Say("  seams: " + text(report.seamMean) + " in the mean, " + text(report.seamGradient) +
@@ -148,6 +152,7 @@ void Stitch(Session& session, StitchOptions options, vtkUltrasoundStitcher* stit
   }
 
   Pieces pieces(options.output, stitcher->GetOutputSpread());
+  std::optional<StitchQualityReport> quality;
   const int slabs = cost.slabs;
   if (slabs > 1 && IsWrittenBySlabs(options.output)) {
     session.Note("the result is larger than the memory that is allowed: it is made and written in " + std::to_string(slabs) +
@@ -165,6 +170,8 @@ void Stitch(Session& session, StitchOptions options, vtkUltrasoundStitcher* stit
     session.Update(stitcher, "stitch"); // or be told why it does not fit
     vtkImageData* stitched = stitcher->GetOutput();
     pieces.Take(stitched);
+    if (options.quality) // before anything is written, so that who stops it keeps what was there
+      quality = QualityOf(session, stitched, volumes);
     SaveVolume(session, stitched, options.output);
   }
 
@@ -179,8 +186,8 @@ void Stitch(Session& session, StitchOptions options, vtkUltrasoundStitcher* stit
   for (int volume = 0; equalized && volume < static_cast<int>(volumes.size()); ++volume)
     session.Say("  " + options.files[static_cast<std::size_t>(volume)] + ": values times " + Fixed(stitcher->GetGain(volume), 3) +
                 ", plus " + Fixed(stitcher->GetOffset(volume), 2));
-  if (options.quality && slabs <= 1)
-    TellQuality(session, stitcher->GetOutput(), volumes);
+  if (quality)
+    TellQuality(session, *quality);
 }
 
 } // namespace
