@@ -238,8 +238,11 @@ class HandEye(unittest.TestCase):
                 ((["--volumes", *volumes, "--tracker", log, "--tool", "Nothing"]), "SensorToTracker"),
                 ((["--volumes", *volumes, "--tracker", work / "absent.csv"]), "absent.csv"),
                 ((["--volumes", *volumes, "--tracker", log, "--rig", "9"]), "Scale is 9; it must be in [0.2, 5]"),
-                ((["--volumes", *volumes, "--tracker", log, "--rig", log]), "label")):
-            aligned = [] if "--rig" in arguments else ["--poses", work / "rig" / "truth.json"]
+                ((["--volumes", *volumes, "--tracker", log, "--rig", log]), "label"),
+                ((["--volumes", *volumes, "--tracker", log, "--align", "contents", "--rig", "1"]), "--rig: it says nothing with --align contents"),
+                ((["--volumes", *volumes, "--tracker", log, "--align", "contents", "--depth-scale", "1.04"]), "--depth-scale: it says nothing"),
+                ((["--volumes", *volumes, "--tracker", log, "--align", "rig", "--start", "tracked"]), "--start: it says nothing")):
+            aligned = [] if {"--rig", "--align"} & set(arguments) else ["--poses", work / "rig" / "truth.json"]
             done = run("calibrate", "hand-eye", *arguments, *aligned, "-o", work / "refused.json")
             self.assertIn(done.returncode, (1, 2), words)
             self.assertIn(words, done.stderr)
@@ -252,6 +255,16 @@ class HandEye(unittest.TestCase):
         done = run("align", *volumes, "--tracker", log, "-o", work / "refused.json")
         self.assertEqual(done.returncode, 2)
         self.assertIn("--calibration", done.stderr)
+        for option in (["--tool", "SensorToTracker"], ["--at", *range(6)]):
+            done = run("align", *volumes, "-o", work / "refused.json", *option)
+            self.assertEqual(done.returncode, 2, option)
+            self.assertIn("--tracker", done.stderr)
+        table = work / "balls.csv"
+        table.write_text("label,x,y,z,radius\n")
+        done = run("calibrate", "hand-eye", "--volumes", *volumes, "--tracker", log, "--rig", table, "-o", table)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("inputs are never overwritten", done.stderr)
+        self.assertEqual(table.read_text(), "label,x,y,z,radius\n")
 
 
     def test_at_says_when_each_was_made(self):
@@ -336,6 +349,8 @@ class Contents(unittest.TestCase):
             volume, _ = aligned(setting)
             self.assertEqual(volume["verdict"], verdict, setting)
             self.assertIn(words, volume["reason"], setting)
+            if verdict == "failed":
+                self.assertEqual(volume["VolumeToWorld"], numpy.eye(4).tolist(), setting)
         # Other points, other weights and other voxels find the same place, and other digits of it.
         found = [plain[0]["VolumeToWorld"]]
         for volume, _ in (aligned("--seed=7"), aligned(points="4000"), aligned("--no-use-reliability"), aligned("--finest-mm=6")):

@@ -3,6 +3,7 @@
 """info and convert on every kind of file: volumes of all formats, beams, time series, tracked sequences, transforms."""
 import json
 import pathlib
+import resource
 import shutil
 import struct
 import subprocess
@@ -209,6 +210,7 @@ class Transforms(unittest.TestCase):
         write_poses(work / "poses.json", ["first.mha", "second.mha"], [numpy.eye(4), pose])
         told = run_json("convert", work / "poses.json", work / "to.tfm")
         self.assertEqual(told["files"], [str(work / "to.first.tfm"), str(work / "to.second.tfm")])
+        size_of_first = (work / "to.first.tfm").stat().st_size
         numbers = [float(word) for word in (work / "to.second.tfm").read_text().splitlines()[3].split()[1:]]
         back = numpy.linalg.inv(pose)  # ITK's lead from the result to what is moved
         numpy.testing.assert_allclose(numbers, [*back[:3, :3].ravel(), *back[:3, 3]], atol=1e-14)
@@ -220,6 +222,11 @@ class Transforms(unittest.TestCase):
         self.assertEqual((done.returncode, list(work.glob("same*.tfm"))), (1, []), done.stderr)
         self.assertIn("two volumes", done.stderr)
         self.assertEqual(run("convert", work / "poses.json", work / "other.json").returncode, 2)
+        # A disk on which the first has room and the second, of longer numbers, has not: both, or none.
+        done = run("convert", work / "poses.json", work / "full.tfm",
+                   preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size_of_first, size_of_first)))
+        self.assertEqual((done.returncode, list(work.glob("full*"))), (1, []), done.stderr)
+        self.assertIn("full.second.tfm", done.stderr)
 
     def test_open_cycles_are_told(self):
         path = work / "open.xml"

@@ -123,6 +123,8 @@ void CalibrateHandEyeFromVolumes(Session& session, HandEyeOptions options)
   inputs.push_back(options.tracker.log);
   if (!options.poses.empty())
     inputs.push_back(options.poses);
+  if (std::filesystem::exists(options.rig)) // a table, not the size of the standard rig
+    inputs.push_back(options.rig);
   CheckOutput(options.output, inputs);
   if (!options.savePoses.empty()) {
     CheckOutput(options.savePoses, inputs);
@@ -147,6 +149,8 @@ void CalibrateHandEyeFromVolumes(Session& session, HandEyeOptions options)
     parameters.target = Eigen::Vector3d(options.target.data());
 
   ApplyPoses(session, volumes, options.poses);
+  if (!options.savePoses.empty())
+    RehearsePoses(session, volumes, options.savePoses);
   std::vector<bool> trusted(volumes.size(), true);
   RigReport rig;
   if (options.poses.empty())
@@ -200,9 +204,16 @@ void CalibrateHandEyeFromVolumes(Session& session, HandEyeOptions options)
     session.status = Session::Doubtful;
     session.Note("more than half of the scans could not be used: check the calibration before using it");
   }
-  WriteTransforms(options.output, {calibration, world}, JsonPlace::Print(report));
+  FileReplacement files; // both, or none
+  const auto stage = [&](const std::string& path) {
+    const std::string staged = files.Stage(path);
+    session.ShowAs(staged, path);
+    return staged;
+  };
   if (!options.savePoses.empty())
-    WritePoses(options.savePoses, poses);
+    WritePoses(stage(options.savePoses), poses);
+  WriteTransforms(stage(options.output), {calibration, world}, JsonPlace::Print(report));
+  files.Commit();
   session.Say("wrote " + options.output);
 }
 
@@ -267,7 +278,13 @@ CalibrateKind CalibrateHandEyeCommand(CLI::App& calibrate)
       ->expected(2);
   options->add_flag_callback(
       "--keep-all", [values] { values->parameters.rejectOutliers = false; }, "Use every aligned scan, however badly it fits");
-  return {options, [values](Session& session) { CalibrateHandEyeFromVolumes(session, *values); }};
+  return {options, [values, options](Session& session) {
+            const bool byRig = values->align == "rig";
+            for (const char* name : {"--rig", "--depth-scale", "--start"})
+              if (options->get_option(name)->count() > 0 && byRig == (std::string_view(name) == "--start"))
+                Misused(std::string(name) + ": it says nothing with --align " + values->align);
+            CalibrateHandEyeFromVolumes(session, *values);
+          }};
 }
 
 } // namespace echorama

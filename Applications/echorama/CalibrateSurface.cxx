@@ -589,9 +589,14 @@ CalibrateKind CalibrateSurfaceCommand(CLI::App& calibrate)
   options->add_option("--slot-ms", values->slotMs, "Length of a slot (default: of a frame)")->check(CLI::Range(0.1, 1000.0));
   options->add_option("--light", values->light, "The one that is put on marks, from 1")->capture_default_str();
   options->add_flag("--all", values->all, "Ask for all marks, also when more would not help");
-  AddParameter(options, Describe(values->detector), "Threshold");
-  for (const char* name : {"RestFrames", "StillPx", "LeavePx", "Passes", "NearMm", "WantedMm", "PlacementMm", "ResidualCentres"})
+  AddParameter(options, Describe(values->detector), "Threshold")->excludes("--check");
+  for (const char* name : {"RestFrames", "StillPx", "LeavePx"})
     AddParameter(options, Describe(values->calibration), name);
+  for (const char* name : {"Passes", "NearMm", "WantedMm", "PlacementMm", "ResidualCentres"})
+    AddParameter(options, Describe(values->calibration), name)->excludes("--check");
+  for (const char* name :
+       {"--wall-mm", "--camera-position", "--up", "--focal", "--maximum-angle", "--lights", "--off-slots", "--slot-ms", "--all"})
+    options->get_option(name)->excludes("--check"); // which takes them from the calibration
   return {options, [values](Session& session) {
             if (values->check.empty())
               MakeCalibration(session, *values);

@@ -116,8 +116,13 @@ void ConvertPoses(Session& session, const ConvertOptions& options)
       session.Note(name.string() + ": how " + pose.file + " is bent is not in it");
     names.push_back(name.string());
   }
-  for (std::size_t i = 0; i < poses.size(); ++i)
-    WriteItkTransform(names[i], poses[i].volumeToWorld);
+  FileReplacement files; // all of them, or none
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const std::string staged = files.Stage(names[i]);
+    session.ShowAs(staged, names[i]);
+    WriteItkTransform(staged, poses[i].volumeToWorld);
+  }
+  files.Commit();
   session.result["files"] = names;
   session.result["lost"] = nlohmann::ordered_json::array();
   for (const std::string& name : names)

@@ -14,11 +14,13 @@ void TrackerOptions::AddTo(CLI::App& options, bool required)
                           ->type_name("FILE");
   if (required)
     file->required();
-  options.add_option("--tool", tool, "The tool that is fixed to the probe, as the recording calls it (default: its only one)");
-  options.add_option(
-      "--at", matching.times,
-      "When each volume was made, in seconds on the recording's clock (default: the volumes' time stamps, else the "
-      "recording's poses one by one)");
+  options.add_option("--tool", tool, "The tool that is fixed to the probe, as the recording calls it (default: its only one)")
+      ->needs(file);
+  options
+      .add_option("--at", matching.times,
+                  "When each volume was made, in seconds on the recording's clock (default: the volumes' time stamps, else the "
+                  "recording's poses one by one)")
+      ->needs(file);
   AddParameter(&options, Describe(reading), "UnitMm", "--unit");
   AddParameter(&options, Describe(matching), "WindowSeconds", "--window");
 }

@@ -124,6 +124,17 @@ const VolumePose& PoseIn(const std::vector<VolumePose>& poses, const std::string
   }
 }
 
+void RehearsePoses(Session& session, const std::vector<LoadedVolume>& volumes, const std::string& path)
+{
+  std::vector<VolumePose> poses;
+  for (const LoadedVolume& volume : volumes)
+    poses.push_back({volume.file, volume.geometry, volume.volumeToWorld});
+  FileReplacement files; // never put in its place
+  const std::string staged = files.Stage(path);
+  session.ShowAs(staged, path);
+  WritePoses(staged, poses);
+}
+
 vtkSmartPointer<vtkMultiBlockDataSet> BlocksOf(const std::vector<LoadedVolume>& volumes)
 {
   auto blocks = vtkSmartPointer<vtkMultiBlockDataSet>::New();

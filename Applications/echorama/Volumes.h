@@ -50,6 +50,10 @@ const VolumePose& PoseIn(const std::vector<VolumePose>& poses, const std::string
 /// An empty path leaves the volumes as their files are.
 void ApplyPoses(Session&, std::vector<LoadedVolume>&, const std::string& path);
 
+/// Refuses before the work what the pose file \a path could not hold after it, such as a file's name that is not UTF-8. Writes
+/// nothing that stays.
+void RehearsePoses(Session&, const std::vector<LoadedVolume>&, const std::string& path);
+
 /// The volumes as the blocks of one data set, named by their files, so that filters name them in what they report.
 vtkSmartPointer<vtkMultiBlockDataSet> BlocksOf(const std::vector<LoadedVolume>&);
 
