@@ -57,6 +57,17 @@ def peak_of(*arguments):
         return usage.ru_maxrss * 1024, json.load(output)
 
 
+def started(folder, *arguments, signal_number=signal.SIGINT):
+    """A process of `echorama arguments` in a folder that has come so far that it catches the signal."""
+    process = subprocess.Popen([PROGRAM, *map(str, arguments)], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                               text=True, cwd=folder)
+    caught = re.compile(r"^SigCgt:\s*(\w+)", re.M)
+    status = pathlib.Path(f"/proc/{process.pid}/status")
+    while process.poll() is None and not int(caught.search(status.read_text())[1], 16) >> (signal_number - 1) & 1:
+        time.sleep(0.05)  # however long the machine takes to start it
+    return process
+
+
 def affine_of(pose):
     return numpy.array(pose["VolumeToWorld"])
 
@@ -263,6 +274,43 @@ class MainJob(unittest.TestCase):
         self.assertEqual(again.returncode, 1)
         self.assertIn("poses.json", again.stderr)
         self.assertEqual((folder / "poses.json").read_bytes(), before)
+
+        # Another run that has written them meanwhile keeps them.
+        (folder / "poses.json").unlink()
+        process = started(folder, "align", *files)
+        time.sleep(0.3)  # it has looked for the name, and aligns
+        (folder / "poses.json").write_text("of another run")
+        _, messages = process.communicate(timeout=300)
+        self.assertEqual(process.returncode, 0, messages)
+        self.assertIn("poses-2.json", messages)
+        self.assertEqual((folder / "poses.json").read_text(), "of another run")
+        self.assertEqual((folder / "poses-2.json").read_bytes(), before)
+
+    def test_align_refuses_first_what_it_could_not_write(self):
+        """Nothing is refused after the work, of which the pairs would tell."""
+        folder, finished = work / "strange", work / "strange.pairs"
+        folder.mkdir()
+        names = [os.fsdecode(b"volume \xfc.mha"), "two.mha", "one.dat"]
+        for name, path in zip(names, [*volumes()[:2], volumes()[0]]):
+            shutil.copy(path, folder / name)
+        for files, more, words in ((names[:2], [], "not UTF-8"), (names[1:], ["--apply", work / "no"], "one.dat: the extension names none")):
+            done = run("align", *(folder / name for name in files), "-o", work / "no.json", "--start", "tracked", "--finished-pairs", finished, *more)
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertIn(words, done.stderr)
+            self.assertFalse(finished.exists())
+        for place in ("no", "no.json"):
+            self.assertFalse((work / place).exists())
+
+    def test_a_dry_run_replaces_nothing(self):
+        poses = work / "precious.json"
+        poses.write_text("precious")
+        write_poses(work / "none.json", volumes(), [numpy.eye(4)] * 3)
+        run("convert", work / "none.json", work / "none.tfm")
+        for option in (["--transforms", "-", work / "none.volume_2.tfm", "--transforms-only"], ["--tracker", "x.csv", "--calibration", "x.json", "--tracker-only"]):
+            done = run("align", *volumes()[:2], "-o", poses, "--dry-run", *option)
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertIn("--dry-run", done.stderr)
+            self.assertEqual(poses.read_text(), "precious")
 
     def test_poses_found_at_a_stride_are_those_of_the_whole_volumes(self):
         poses = work / "coarse.json"
@@ -778,12 +826,7 @@ class Manners(unittest.TestCase):
         folder = work / "interrupted"
         folder.mkdir(exist_ok=True)
         before = snapshot(folder)
-        process = subprocess.Popen([PROGRAM, *map(str, arguments)], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                                   text=True, cwd=folder)
-        caught = re.compile(r"^SigCgt:\s*(\w+)", re.M)
-        status = pathlib.Path(f"/proc/{process.pid}/status")
-        while process.poll() is None and not int(caught.search(status.read_text())[1], 16) >> (signal_number - 1) & 1:
-            time.sleep(0.05)  # however long the machine takes to start it
+        process = started(folder, *arguments, signal_number=signal_number)
         time.sleep(1.5)
         process.send_signal(signal_number)
         output, messages = process.communicate(timeout=120)
@@ -798,6 +841,11 @@ class Manners(unittest.TestCase):
                          "--candidates", "1000")
         self.interrupted(signal.SIGTERM, "phantom", "-o", "volumes", "--spacing", "0.5", "--count", "40")
         self.interrupted(signal.SIGINT, "stitch", *volumes(), "-o", "stitched.mha", "--spacing", "0.4")
+
+    def test_stitch_measures_before_it_replaces(self):
+        """Whoever stops the measuring of quality keeps the file that was there: the last that happens is that it takes its place."""
+        stages = list(run_json("stitch", *volumes(), "-o", work / "measured.mha", "--poses", phantom / "truth.json", "--quality")["stages"])
+        self.assertLess(stages.index("quality"), stages.index("write"), stages)
 
 
 if __name__ == "__main__":

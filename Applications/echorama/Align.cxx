@@ -91,6 +91,17 @@ void TellPlan(Session& session, std::size_t volumes, const AlignVolumesPlan& pla
               Fixed(plan.secondsPerVolume, 2) + " s to prepare a volume), and more for pairs that are tried again");
 }
 
+// Nobody asked for what another run has written meanwhile to be replaced.
+void KeepWhatCameMeanwhile(Session& session, std::string& output)
+{
+  const std::string wanted = output;
+  const std::filesystem::path name(wanted);
+  for (int number = 2; std::filesystem::exists(output); ++number)
+    output = name.stem().string() + "-" + std::to_string(number) + name.extension().string();
+  if (output != wanted)
+    session.Note(wanted + ": it has appeared while the volumes were aligned; their poses go to " + output);
+}
+
 // Poses, what they name and the moved volumes: all take their places, or none does.
 void Write(Session& session, const AlignOptions& options, const std::vector<LoadedVolume>& volumes,
            const std::vector<std::string>& places, std::vector<VolumePose> poses, FileReplacement& files, OutputFolder* folder)
@@ -120,7 +131,8 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
     inputs.insert(inputs.end(), files.begin(), files.end());
   if (!options.poses.empty())
     inputs.push_back(options.poses);
-  if (options.output.empty()) {
+  const bool isDefault = options.output.empty();
+  if (isDefault) {
     options.output = DefaultOutput;
     if (!aligner->GetDryRun() && std::filesystem::exists(options.output))
       throw Error(Error::Kind::FileSystem, options.output + ": it is there already; name it with -o to replace it");
@@ -154,8 +166,11 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
   if (!options.apply.empty()) {
     folder = std::make_unique<OutputFolder>(options.apply, inputs);
     session.ShowAs(folder->StageFolder(), options.apply);
-    for (const std::string& file : options.files)
-      places.push_back(folder->Stage(std::filesystem::path(file).filename().string()));
+    for (const std::string& file : options.files) {
+      const std::string name = std::filesystem::path(file).filename().string();
+      CheckVolumeOutput(folder->Final(name), inputs);
+      places.push_back(folder->Stage(name));
+    }
   }
   FileReplacement files; // all that is written takes its place together
 
@@ -179,12 +194,16 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
     return;
   }
   GiveLandmarks(landmarks, volumes, aligner);
+  if (!aligner->GetDryRun())
+    RehearsePoses(session, volumes, options.output);
   aligner->SetInputDataObject(BlocksOf(volumes));
   session.Update(aligner, "align");
   if (aligner->GetDryRun()) {
     TellPlan(session, volumes.size(), aligner->Plan());
     return;
   }
+  if (isDefault)
+    KeepWhatCameMeanwhile(session, options.output);
 
   nlohmann::ordered_json report = ToJson(aligner->Result(), 1); // from 1, as --fixed counts
   session.result["output"] = options.output;
@@ -281,6 +300,8 @@ void EchoramaCommand(CLI::App* options, Action& action)
   options->get_option("--calibration")->needs("--tracker");
   options->get_option("--tracker-only")->needs("--tracker")->excludes(landmarks);
   options->get_option("--transforms-only")->excludes(landmarks);
+  for (const char* only : {"--tracker-only", "--transforms-only"}) // they do next to nothing, and write it
+    options->get_option("--dry-run")->excludes(only);
   options->add_option("--apply", values->apply, "Folder for the volumes with their new geometry")->type_name("FOLDER");
   AddParameter(options, Describe(values->reading.parameters), "Stride", "--stride")->excludes("--apply"); // of all voxels
   CLI::Option* deformable =
