@@ -92,6 +92,9 @@ with tempfile.TemporaryDirectory() as folder:
     check(missing.returncode == 1 and "aligning" in missing.stderr and "no such.mha" in missing.stderr,
           f"a missing file: status {missing.returncode}, {missing.stderr!r}")
     check(not (folder / "missing" / "report.html").exists(), "a report in spite of a failure")
+    again = demo(folder / "own", "--", folder / "own" / "stitched.mha", volumes[0])
+    check(again.returncode == 1 and "copy it elsewhere" in again.stderr, f"a result as input: status {again.returncode}, {again.stderr!r}")
+    check((folder / "own" / "stitched.mha").exists() and (folder / "own" / "report.html").exists(), "a result was deleted that was an input")
     one = demo(folder / "one", "--", volumes[0])
     check(one.returncode == 2, f"one volume alone: status {one.returncode}")
 

@@ -144,6 +144,9 @@ def surface_demo(options):
 
 def demo(options):
     steps, out = begin(options)
+    for volume in options.volumes:
+        if pathlib.Path(volume).resolve() in [(out / old).resolve() for old in RESULTS]:
+            raise StepFailed(f"{volume}: it is a result of an earlier run, which this one replaces; copy it elsewhere first")
     for old in RESULTS:  # a step that fails must not leave the report of an earlier run
         (out / old).unlink(missing_ok=True)
     truth_file, straight = None, []
@@ -151,7 +154,7 @@ def demo(options):
         # A shell's * finds the companions NAME.ValidRegion.EXT too; they are parts of NAME.EXT.
         named = {str(short(volume)) for volume in options.volumes}
         files = [short(volume) for volume in options.volumes
-                 if re.sub(r"\.(ValidRegion|Provenance|Coverage|Spread|Embedding)(?=\.\w+$)", "", str(short(volume))) not in named - {str(short(volume))}]
+                 if re.sub(r"\.(ValidRegion|Provenance|Coverage|Spread|Embedding)(?=\.(nii\.gz|\w+)$)", "", str(short(volume))) not in named - {str(short(volume))}]
     elif options.synthetic:
         steps.run("making three volumes of an invented abdomen by simulated ultrasound, knocked out of place", "synthesize",
                   scene_file(out, options.quick), "-o", out / "synthetic")
