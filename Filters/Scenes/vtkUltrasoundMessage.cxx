@@ -22,10 +22,17 @@ namespace {
 
 enum class Kind : char { Nothing, Image, Surface, Blocks };
 
+std::string TextOf(const char* text)
+{
+  return text ? text : "";
+}
+
 void PackArray(Packed& to, vtkAbstractArray* array)
 {
-  const char* name = array->GetName();
-  to(std::string(name ? name : ""), array->GetDataType(), array->GetNumberOfComponents(), array->GetNumberOfTuples());
+  to(TextOf(array->GetName()), array->GetDataType(), array->GetNumberOfComponents(), array->GetNumberOfTuples());
+  for (int n = 0; n < array->GetNumberOfComponents(); ++n) {
+    to(TextOf(array->GetComponentName(n)));
+  }
   if (auto* texts = vtkStringArray::SafeDownCast(array)) {
     for (vtkIdType i = 0; i < texts->GetNumberOfValues(); ++i) {
       to(static_cast<const std::string&>(texts->GetValue(i)));
@@ -49,6 +56,12 @@ vtkSmartPointer<vtkAbstractArray> UnpackArray(Unpacked& from)
   array->SetName(name.c_str());
   array->SetNumberOfComponents(components);
   array->SetNumberOfTuples(tuples);
+  for (int n = 0; n < components; ++n) {
+    from(name);
+    if (!name.empty()) {
+      array->SetComponentName(n, name.c_str());
+    }
+  }
   if (auto* texts = vtkStringArray::SafeDownCast(array)) {
     for (vtkIdType i = 0; i < texts->GetNumberOfValues(); ++i) {
       from(bytes);
@@ -67,21 +80,27 @@ void PackArrays(Packed& to, vtkFieldData* fields)
   for (int n = 0; n < fields->GetNumberOfArrays(); ++n) {
     PackArray(to, fields->GetAbstractArray(n));
   }
-  auto* attributes = vtkDataSetAttributes::SafeDownCast(fields);
-  vtkDataArray* scalars = attributes ? attributes->GetScalars() : nullptr;
-  to(std::string(scalars && scalars->GetName() ? scalars->GetName() : ""));
+  if (auto* attributes = vtkDataSetAttributes::SafeDownCast(fields)) {
+    int active[vtkDataSetAttributes::NUM_ATTRIBUTES]; // which array is the scalars, which the vectors ...
+    attributes->GetAttributeIndices(active);
+    for (const int index : active) {
+      to(index);
+    }
+  }
 }
 
 void UnpackArrays(Unpacked& from, vtkFieldData* fields)
 {
   int count = 0;
-  std::string scalars;
   for (from(count); count > 0; --count) {
     fields->AddArray(UnpackArray(from));
   }
-  from(scalars);
-  if (!scalars.empty()) {
-    vtkDataSetAttributes::SafeDownCast(fields)->SetActiveScalars(scalars.c_str());
+  if (auto* attributes = vtkDataSetAttributes::SafeDownCast(fields)) {
+    for (int type = 0; type < vtkDataSetAttributes::NUM_ATTRIBUTES; ++type) {
+      int index = -1;
+      from(index);
+      attributes->SetActiveAttribute(index, type);
+    }
   }
 }
 
@@ -141,8 +160,7 @@ void vtkUltrasoundMessage::Pack(Packed& to, vtkDataObject* data)
   } else if (auto* blocks = vtkMultiBlockDataSet::SafeDownCast(data)) {
     to(Kind::Blocks, blocks->GetNumberOfBlocks());
     for (unsigned int n = 0; n < blocks->GetNumberOfBlocks(); ++n) {
-      const char* name = blocks->HasMetaData(n) ? blocks->GetMetaData(n)->Get(vtkCompositeDataSet::NAME()) : nullptr;
-      to(std::string(name ? name : ""));
+      to(TextOf(blocks->HasMetaData(n) ? blocks->GetMetaData(n)->Get(vtkCompositeDataSet::NAME()) : nullptr));
       Pack(to, blocks->GetBlock(n));
     }
   } else {

@@ -50,7 +50,7 @@ class Ranks(unittest.TestCase):
 
 
 def digest_of(data, digest):
-    """Every array of all blocks, by name, and where images are. Returns how many arrays there were."""
+    """Every array of all blocks, by name, which of them are active, and where images are. Returns how many arrays there were."""
     if data.IsA("vtkMultiBlockDataSet"):
         count = 0
         for n in range(data.GetNumberOfBlocks()):
@@ -62,13 +62,15 @@ def digest_of(data, digest):
         direction = data.GetDirectionMatrix()
         numbers = [*data.GetOrigin(), *data.GetSpacing(), *(direction.GetElement(r, c) for r in range(3) for c in range(3))]
         digest.update(repr((data.GetExtent(), [float(number).hex() for number in numbers])).encode())
-        scalars = data.GetPointData().GetScalars()
-        digest.update(scalars.GetName().encode() if scalars else b"none")
+    for attributes in (data.GetPointData(), data.GetCellData()):
+        active = [attributes.GetAbstractAttribute(kind) for kind in range(attributes.NUM_ATTRIBUTES)]
+        digest.update(repr([array.GetName() if array else None for array in active]).encode())
     count = 0
     for attributes in (data.GetPointData(), data.GetCellData(), data.GetFieldData()):
         for name in sorted(attributes.GetArrayName(n) for n in range(attributes.GetNumberOfArrays())):
             array = attributes.GetAbstractArray(name)
-            digest.update(f"{name} {array.GetDataType()} {array.GetNumberOfComponents()}".encode())
+            components = [array.GetComponentName(n) for n in range(array.GetNumberOfComponents())]
+            digest.update(f"{name} {array.GetDataType()} {components}".encode())
             if array.IsA("vtkStringArray"):
                 digest.update(repr([array.GetValue(n) for n in range(array.GetNumberOfValues())]).encode())
             else:
