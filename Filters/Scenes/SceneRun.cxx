@@ -79,8 +79,7 @@ SceneRun::SceneRun(SynthesisScene scene, int landmarks, const MeshReader& readMe
 
 bool SceneRun::Continues() const
 {
-  // Without friction tissue forgets the way.
-  return scene_.PathViews() && (scene_.gel || (scene_.press && scene_.press->tissue.friction > 0.0));
+  return !views_.front().way.empty();
 }
 
 bool SceneRun::BodiesComeAndGo() const

@@ -20,19 +20,26 @@ std::vector<double> StepTimes(int steps, double seconds)
   return times;
 }
 
+// Into how many states of tissue and gel a sweep is divided.
+int StatesOf(const SynthesisScene& scene, int steps)
+{
+  const SceneSweep& sweep = scene.sweep;
+  const bool moves = sweep.seconds > 0.0 &&
+                     (sweep.alongRecording || !sweep.velocityMmPerSecond.isZero(0.0) || !sweep.turnDegreesPerSecond.isZero(0.0));
+  return moves && (scene.press || scene.gel) ? std::min(sweep.states, steps) : 1;
+}
+
 SceneView ViewAt(const SynthesisScene& scene, int steps, double time, const Pose& pose, const ScenePath* path)
 {
   SceneView view;
   view.probeToWorld = pose;
-  const bool moves = scene.sweep.seconds > 0.0 && steps > 1 &&
-                     (path || !scene.sweep.velocityMmPerSecond.isZero(0.0) || !scene.sweep.turnDegreesPerSecond.isZero(0.0));
   const auto at = [&](double fromMiddle) {
     return TimedPose{time + fromMiddle, path ? path->At(time + fromMiddle) : scene.sweep.ProbeToWorldAt(pose, fromMiddle)};
   };
   if (scene.sweep.seconds > 0.0 && steps > 1)
     for (const double fromMiddle : StepTimes(steps, scene.sweep.seconds))
       view.steps.push_back(at(fromMiddle).pose);
-  const int states = moves && (scene.press || scene.gel) ? std::min(scene.sweep.states, steps) : 1;
+  const int states = StatesOf(scene, steps);
   for (int state = 0; state < states; ++state) {
     SceneState part{{time, pose}, steps * state / states, steps * (state + 1) / states - 1};
     if (states > 1)
@@ -79,7 +86,9 @@ void AddWays(const SynthesisScene& scene, const ScenePath& path, double stepMm, 
   const ProbeShape shape(probe, scene.press ? scene.press->head : ProbeHead());
   const Eigen::AlignedBox3d head(Eigen::Vector3d(shape.Low().x(), shape.Low().y(), -40.0),
                                  Eigen::Vector3d(shape.High().x(), shape.High().y(), 0.0));
-  TimedPose last{path.FirstTime(), path.At(path.FirstTime())};
+  const TimedPose& first = views.front().states.front().probe;
+  // It may be of the path's begin, but for rounding.
+  TimedPose last = first.time > path.FirstTime() ? TimedPose{path.FirstTime(), path.At(path.FirstTime())} : first;
   std::size_t number = 0;
   for (SceneView& view : views) {
     if (number++ == 0)
@@ -114,9 +123,12 @@ std::vector<SceneView> ViewsOf(const SynthesisScene& scene)
     const ScenePath path = *ScenePath::Of(scene);
     const ScenePathViews& wanted = *scene.PathViews();
     const bool along = scene.sweep.alongRecording && steps > 1;
-    for (const double time : path.Times(wanted, along ? scene.sweep.seconds : 0.0))
+    // Without friction tissue forgets the way.
+    const bool goesOn = scene.gel || (scene.press && scene.press->tissue.friction > 0.0);
+    const bool takesTime = along || (goesOn && StatesOf(scene, steps) > 1);
+    for (const double time : path.Times(wanted, takesTime ? scene.sweep.seconds : 0.0))
       views.push_back(ViewAt(scene, steps, time, path.At(time), along ? &path : nullptr));
-    if (scene.press || scene.gel)
+    if (goesOn)
       AddWays(scene, path, wanted.stepMm, parameters.probe, views);
   }
   return views;

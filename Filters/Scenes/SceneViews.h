@@ -17,8 +17,9 @@ struct SceneView {
   Pose probeToWorld = Pose::Identity();
   std::vector<Pose> steps;        ///< none: it rests
   std::vector<SceneState> states; ///< one at least, in the order of time
-  /// On a path: the moments from the view before (the first view: from the path's begin) up to the last state, which are among
-  /// them; no part of the head goes farther than stepMm between two. Else none.
+  /// On a path with gel or friction, where tissue and gel go on from view to view: the moments from the view before (the first
+  /// view: from the path's begin) up to the last state, which are among them; no part of the head goes farther than stepMm
+  /// between two. Else none.
   std::vector<TimedPose> way;
 };
 

@@ -110,6 +110,42 @@ TEST(SceneViews, ASweepThatMovesHasSeveralStates)
       << "the probe rests";
 }
 
+TEST(SceneViews, ASweepBesideThePathStaysWithinItsTimesWhereTheWayMatters)
+{
+  const std::string sweep = R"("sweep": {"seconds": 0.6, "velocityMmPerSecond": [10, 0, 0]}, )";
+  const auto free = ViewsOf(Parse(R"("press": {}, )" + sweep + keys + R"("count": 3})"));
+  ASSERT_EQ(free.size(), 3u);
+  for (const SceneView& view : free) {
+    EXPECT_TRUE(view.way.empty()) << "tissue forgets it";
+    ASSERT_EQ(view.states.size(), 3u);
+  }
+  EXPECT_EQ(free.front().states[1].probe.time, 0.0);
+  EXPECT_EQ(free.back().states[1].probe.time, 4.0);
+
+  for (const std::string goesOn : {R"("press": {"friction": 0.3}, )", R"("gel": {}, )"}) {
+    const auto views = ViewsOf(Parse(goesOn + sweep + keys + R"("count": 3})"));
+    ASSERT_EQ(views.size(), 3u);
+    EXPECT_NEAR(views.front().states[1].probe.time, 0.3, 1e-12);
+    EXPECT_NEAR(views.back().states[1].probe.time, 3.7, 1e-12);
+    EXPECT_EQ(views.front().way.front().time, 0.0);
+    EXPECT_LE(views.back().way.back().time, 4.0);
+    EXPECT_NE(MessageOf(Parse(goesOn + sweep + keys + R"("times": [0.2]})"))
+                  .find("the sweep around 0.2 s is not within the path, from 0 to 4 s"),
+              std::string::npos);
+  }
+}
+
+TEST(SceneViews, TheFirstSweepMayBeginWithThePath)
+{
+  // 0.1 + 0.25 - 0.25 is a little less than 0.1.
+  const auto views =
+      ViewsOf(Parse(R"("gel": {}, "sweep": {"seconds": 0.5, "alongRecording": true, "states": 6}, "views": {"keys": [
+    {"seconds": 0.1, "pose": {"face": [0, 0, 0], "target": [0, 0, 50]}},
+    {"seconds": 2, "pose": {"face": [20, 0, 0], "target": [20, 0, 50]}}], "count": 2})"));
+  EXPECT_EQ(views.at(0).way.front().time, views.at(0).states.front().probe.time);
+  EXPECT_NEAR(views.at(0).way.front().time, 0.1, 1e-12);
+}
+
 TEST(SceneViews, RefusesWhatATimeCannotBe)
 {
   EXPECT_NE(MessageOf(Parse(R"("gel": {}, "sweep": {"seconds": 1, "alongRecording": true}, )" + keys + R"("times": [1, 1.5]})"))
