@@ -105,6 +105,8 @@ echorama::ParameterList vtkUltrasoundSynthesizer::Parameters()
   using echorama::Parameter;
   auto& v = this->Own;
   const std::string otherwise = " Not used with a probe input.";
+  echorama::ParameterList values = Describe(this->Values);
+  echorama::Named(values, "Sampling").When("Mode", "coherent"); // counting spreads its rays by Sobol's sequence
   return echorama::Join(
       {{Parameter("Position", v.position, {}, "mm", "Where the middle of the probe's face lies in the world." + otherwise),
         Parameter("Orientation", v.orientation, {}, "degrees",
@@ -122,7 +124,7 @@ echorama::ParameterList vtkUltrasoundSynthesizer::Parameters()
                   "Which plane of the sweep: -0.5 is the first, 0.5 the last.")
             .When("SliceOnly", "on"),
         Parameter("SpacingMm", v.spacingMm, {0, 1000}, "mm", "Edge of the cubic voxels. 0: about as many voxels as samples.")},
-       Describe(this->Values)});
+       std::move(values)});
 }
 
 //----------------------------------------------------------------------------
