@@ -52,22 +52,30 @@ vtkUltrasoundAlignmentSession::~vtkUltrasoundAlignmentSession()
 }
 
 //----------------------------------------------------------------------------
-bool vtkUltrasoundAlignmentSession::Change(const std::function<void()>& change, const std::string& label)
+bool vtkUltrasoundAlignmentSession::Try(const std::function<void()>& change)
 {
-  const SessionState before = this->Session.State();
-  const std::set<int> selection = this->Session.Selection();
-  const std::optional<Eigen::Vector3d> centre = this->Session.ChosenCentre();
-  const long long version = this->Session.HistoryVersion();
-  const bool modified = this->GetModifiedSinceSave();
-  bool done = false;
   try {
     change();
-    done = true;
+    return true;
   } catch (const std::bad_alloc&) {
     vtkErrorMacro("there is not enough memory");
   } catch (const std::exception& error) {
     vtkErrorMacro(<< error.what());
   }
+  return false;
+}
+
+//----------------------------------------------------------------------------
+bool vtkUltrasoundAlignmentSession::Change(const std::function<void()>& change, const std::string& label,
+                                           const std::function<void()>& takeNotes)
+{
+  const SessionState before = this->Session.State();
+  const Project notes = this->Notes();
+  const std::set<int> selection = this->Session.Selection();
+  const std::optional<Eigen::Vector3d> centre = this->Session.ChosenCentre();
+  const long long version = this->Session.HistoryVersion();
+  const bool modified = this->GetModifiedSinceSave();
+  const bool done = this->Try(change);
 
   const SessionImages::Changes changes = this->Images->Follow(before);
   for (const std::string& name : changes.Unpainted) {
@@ -76,17 +84,21 @@ bool vtkUltrasoundAlignmentSession::Change(const std::function<void()>& change, 
   if (changes.OthersAreHere && !this->GreyWindowChosen) {
     this->GreyWindow.reset();
   }
-  const bool history = version != this->Session.HistoryVersion();
-  if (history) {
-    this->Storage.SetForgotten(false);
-    this->Images->Forget();
-  }
   const bool moved = changes.Poses != 0 || changes.Volumes != 0;
   if (moved) {
     this->Truth.Outdate();
   }
+  const bool taken = done && takeNotes;
+  if (taken) {
+    this->Try(takeNotes);
+  }
+  const bool history = version != this->Session.HistoryVersion(), noted = !SameNotes(notes, this->Notes());
+  if (history || noted) {
+    this->Storage.SetForgotten(false);
+    this->Images->Forget();
+  }
   const bool ended = this->Storage.EndsUnfinished() && !this->Session.Editing();
-  if (this->AutomaticBackups && done && !this->Storage.IsFresh(this->Session.State()) && (moved || history || ended)) {
+  if (this->AutomaticBackups && done && (moved || history || noted || ended) && !this->Storage.IsFresh(this->Now())) {
     this->BackUpInTheBackground(!label.empty()            ? label
                                 : this->Session.Editing() ? this->Session.EditLabel()
                                                           : this->Session.UndoLabel());
@@ -99,8 +111,8 @@ bool vtkUltrasoundAlignmentSession::Change(const std::function<void()>& change, 
       this->InvokeEvent(event, of > 0 ? &of : nullptr);
     }
   };
-  tell(VolumesChangedEvent, changes.Volumes);
-  tell(PosesChangedEvent, changes.Poses);
+  tell(VolumesChangedEvent, taken ? -1 : changes.Volumes); // who shows poses shows how far they are from the truth
+  tell(PosesChangedEvent, taken ? -1 : changes.Poses);
   tell(VoxelsChangedEvent, changes.Voxels);
   tell(MeasurementsChangedEvent, before.measurements == this->Session.State().measurements ? 0 : -1);
   tell(SelectionChangedEvent, selected ? -1 : 0);
@@ -380,20 +392,46 @@ std::vector<std::string> vtkUltrasoundAlignmentSession::Folders() const
 }
 
 //----------------------------------------------------------------------------
+Project vtkUltrasoundAlignmentSession::Notes() const
+{
+  return {{}, this->Truth.File(), this->Comment, this->Truth.ByHand(this->Session.State())};
+}
+
+//----------------------------------------------------------------------------
 Project vtkUltrasoundAlignmentSession::Now() const
 {
-  return {this->Images->State(), this->Truth.File(), this->Comment, this->Truth.ByHand(this->Session.State())};
+  Project now = this->Notes();
+  now.state = this->Images->State();
+  return now;
+}
+
+//----------------------------------------------------------------------------
+// Without truths a project is open all the same.
+void vtkUltrasoundAlignmentSession::TakeNotes(const std::string& path, const Project& project)
+{
+  this->Comment = project.comment;
+  this->Truth = {};
+  this->Truth.SetFile(project.truth);
+  if (!project.truth.empty()) {
+    const std::string found = FindVolume(path, project.truth, this->Folders());
+    this->Try([&] { this->Truth.Read(found.empty() ? project.truth : found, this->Session.State(), this->PointsOf); });
+  }
+  for (const SessionVolume& volume : this->Session.State().volumes) {
+    if (const auto byHand = project.truths.find(volume.name); byHand != project.truths.end()) {
+      this->Try([&] { this->Truth.SetByHand(volume, byHand->second, this->PointsOf); });
+    }
+  }
 }
 
 //----------------------------------------------------------------------------
 bool vtkUltrasoundAlignmentSession::OpenProject(const char* path, vtkMultiBlockDataSet* blocks)
 {
   const std::string name = TextOf(path);
-  std::map<std::string, Pose> truths;
+  Project project;
   const auto open = [&]() {
     BackupStamp stamp;
     const std::size_t fingerprint = SessionStorage::FingerprintOf(name);
-    Project project = ReadProject(name, &stamp);
+    project = ReadProject(name, &stamp);
     std::vector<SessionVolume>& volumes = project.state.volumes;
     for (SessionVolume& volume : volumes) {
       volume.id = 0;
@@ -408,10 +446,6 @@ bool vtkUltrasoundAlignmentSession::OpenProject(const char* path, vtkMultiBlockD
     for (std::size_t i = 0; i < images.size(); ++i) {
       this->Images->Hold(this->Session.State().volumes[i], images[i]);
     }
-    truths = project.truths;
-    this->Comment = project.comment;
-    this->Truth = {};
-    this->Truth.SetFile(project.truth);
     if (stamp.number > 0) {
       this->Storage.Recovered(name);
     } else {
@@ -419,21 +453,10 @@ bool vtkUltrasoundAlignmentSession::OpenProject(const char* path, vtkMultiBlockD
       this->Storage.Opened(name, project, fingerprint);
     }
   };
-  const bool opened = this->Change(open, "Open");
-  const std::string truth = this->Truth.File();
-  if (opened && !truth.empty()) { // without truths the project is open all the same
-    const std::string found = FindVolume(this->GetProjectPath(), truth, this->Folders());
-    this->ReadTruth(found.empty() ? truth.c_str() : found.c_str());
-  }
-  for (const SessionVolume& volume : this->Session.State().volumes) {
-    if (const auto byHand = truths.find(volume.name); opened && byHand != truths.end()) {
-      this->DoTruth([&] { this->Truth.SetByHand(volume, byHand->second, this->PointsOf); });
-    }
-  }
-  if (opened) {
+  return this->Change(open, "Open", [&]() {
+    this->TakeNotes(name, project);
     this->Storage.SetSavedTruth(this->Truth.File(), this->Truth.ByHand(this->Session.State()));
-  }
-  return opened;
+  });
 }
 
 //----------------------------------------------------------------------------
@@ -469,8 +492,7 @@ bool vtkUltrasoundAlignmentSession::GetProjectFiles(const char* path, vtkStringA
 bool vtkUltrasoundAlignmentSession::GetModifiedSinceSave() const
 {
   const Project& saved = this->Storage.Saved();
-  return this->Session.State() != saved.state || this->Truth.File() != saved.truth || this->Comment != saved.comment ||
-         !SameTruths(this->Truth.ByHand(this->Session.State()), saved.truths);
+  return this->Session.State() != saved.state || !SameNotes(this->Notes(), saved);
 }
 
 //----------------------------------------------------------------------------
@@ -549,9 +571,11 @@ int vtkUltrasoundAlignmentSession::GetAbandonedSessions(vtkStringArray* folders)
 //----------------------------------------------------------------------------
 bool vtkUltrasoundAlignmentSession::RestoreBackup(const char* path)
 {
-  return this->Change([&]() {
-    const std::string name = TextOf(path);
-    SessionState state = ReadProject(name).state;
+  const std::string name = TextOf(path);
+  Project project;
+  const auto restore = [&]() {
+    project = ReadProject(name);
+    SessionState& state = project.state;
     if (this->Session.Editing()) {
       throw Error(Error::Kind::NotPossible, "no backup can be restored during an edit");
     }
@@ -564,7 +588,8 @@ bool vtkUltrasoundAlignmentSession::RestoreBackup(const char* path)
         this->Images->Hold(this->Session.State().volumes[i], images[read++]);
       }
     }
-  });
+  };
+  return this->Change(restore, {}, [&]() { this->TakeNotes(name, project); });
 }
 
 //----------------------------------------------------------------------------

@@ -14,7 +14,7 @@
  *
  * | event                  | when                                                                    |
  * | ---------------------- | ----------------------------------------------------------------------- |
- * | VolumesChangedEvent    | volumes came or went, or names, groups, looks, landmarks                |
+ * | VolumesChangedEvent    | volumes came or went, or names, groups, looks, landmarks; a backup was restored |
  * | PosesChangedEvent      | at every step of a drag                                                  |
  * | SelectionChangedEvent  | the selection, or the centre of rotation                                 |
  * | VoxelsChangedEvent     | painted, carved                                                         |
@@ -299,7 +299,7 @@ public:
   std::string GetComment() const { return this->Comment; }
   void SetComment(const char* comment)
   {
-    this->Change([&] { this->Comment = comment ? comment : ""; });
+    this->Change([&] { this->Comment = comment ? comment : ""; }, "Change comment");
   }
   /** Poses alone: the file that echorama align and stitch read and write. ReadPoses is an edit, of the volumes that the file
    * names. */
@@ -308,8 +308,8 @@ public:
   ///@}
 
   ///@{
-  /** Backups after each edit, and at least once a second while one goes on; a thread of its own waits for the disk. Default off:
-   * scripts do not write by surprise; the workbench turns it on. */
+  /** Backups after each edit or change of comment and truth, and at least once a second while an edit goes on; a thread of its
+   * own waits for the disk. Default off: scripts do not write by surprise; the workbench turns it on. */
   void SetAutomaticBackups(bool on);
   bool GetAutomaticBackups() const { return this->AutomaticBackups; }
   /** NAME.backups beside the project NAME.json; of a session that was never saved a folder under the user's data folder. Empty:
@@ -324,11 +324,12 @@ public:
                           vtkDoubleArray* times = nullptr);
   /** Of the project that is open: its newest readable backup, when that is later than the project file and differs from what is
    * open. Empty: there is none. For a window that has opened a project: work that was not saved. */
-  std::string GetLaterBackup() { return this->Storage.LaterBackup(this->Session.State(), this->Folders()); }
+  std::string GetLaterBackup() { return this->Storage.LaterBackup(this->Now(), this->Folders()); }
   /** A person decided not to keep what was not saved: its backups go at the end of the session, or when it opens another project.
    * A further edit takes this back. Without edits (volumes were opened, no more) an unsaved session leaves no backups anyway. */
   void ForgetUnsavedWork() { this->Storage.SetForgotten(true); }
-  /** Restoring is an edit: it can be undone. Volumes that are here keep their ids, others are read. */
+  /** Restoring is an edit: it can be undone. Volumes that are here keep their ids, others are read. Comment and truth come back,
+   * too, and are not undone. */
   bool RestoreBackup(const char* path);
   /** Folders of sessions that ended without being saved, and whose process is gone: the newest first. OpenProject opens the
    * newest backup in one, DiscardBackups removes them. */
@@ -421,9 +422,11 @@ private:
     const echorama::SessionVolume* volume = this->Find(id);
     return volume ? volume->*what : T();
   }
-  /** Does it, reports an error that it throws, and tells what has changed. \a label: of the backup, when it is not the edit's.
-   * Returns whether it went well. */
-  bool Change(const std::function<void()>& change, const std::string& label = {});
+  /** Does it, and reports an error that it throws. Returns whether it went well. */
+  bool Try(const std::function<void()>& change);
+  /** The same, and tells what has changed. \a label: of the backup, when it is not the edit's. \a takeNotes: what follows when
+   * the images are where the state says. */
+  bool Change(const std::function<void()>& change, const std::string& label = {}, const std::function<void()>& takeNotes = {});
   template <class Result, class... Parameters>
   bool Do(Result (Kernel::*edit)(Parameters...), const std::decay_t<Parameters>&... arguments)
   {
@@ -439,7 +442,7 @@ private:
   /** The same for the truth, which the kernel knows nothing of: whoever shows poses shows how far they are from it. */
   bool DoTruth(const std::function<void()>& change)
   {
-    const bool done = this->Change(change);
+    const bool done = this->Change(change, "Change truth");
     this->Modified();
     this->InvokeEvent(PosesChangedEvent, nullptr);
     return done;
@@ -448,6 +451,9 @@ private:
   void BackUpInTheBackground(const std::string& label);
   void TellTrouble(const std::string& trouble);
   void Warn(const std::string& text); ///< unless it is empty
+  echorama::Project Notes() const;    ///< what a project holds beside the state
+  /** Those of the project \a path, whose volumes are here. */
+  void TakeNotes(const std::string& path, const echorama::Project& project);
   std::vector<std::string> Folders() const;
 
   echorama::AlignmentSession Session;

@@ -284,9 +284,14 @@ bool SameTruths(const std::map<std::string, Pose>& a, const std::map<std::string
   });
 }
 
+bool SameNotes(const Project& a, const Project& b)
+{
+  return a.truth == b.truth && a.comment == b.comment && SameTruths(a.truths, b.truths);
+}
+
 bool operator==(const Project& a, const Project& b)
 {
-  return a.state == b.state && a.truth == b.truth && a.comment == b.comment && SameTruths(a.truths, b.truths);
+  return a.state == b.state && SameNotes(a, b);
 }
 
 Project ReadProject(const std::string& path, BackupStamp* stamp)

@@ -28,6 +28,7 @@ struct Project {
 };
 
 bool operator==(const Project&, const Project&); ///< exact: to the last bit, of all but the last backup
+bool SameNotes(const Project&, const Project&);  ///< the same, of all but the state
 bool SameTruths(const std::map<std::string, Pose>& a, const std::map<std::string, Pose>& b);
 
 /// What a backup knows beside its project.

@@ -187,7 +187,7 @@ std::vector<Backup> SessionStorage::List(std::string& trouble) const
   return !path_.empty() ? Backups::ListFor(path_) : folder.empty() ? std::vector<Backup>() : Backups::List(folder);
 }
 
-std::string SessionStorage::LaterBackup(const SessionState& state, const std::vector<std::string>& folders) const
+std::string SessionStorage::LaterBackup(const Project& now, const std::vector<std::string>& folders) const
 {
   struct stat saved {};
   if (path_.empty() || stat(path_.c_str(), &saved) != 0)
@@ -196,12 +196,15 @@ std::string SessionStorage::LaterBackup(const SessionState& state, const std::ve
     writer_->Wait();
   try {
     if (const std::optional<Backup> newest = Backups::NewestFor(path_, saved.st_mtim, saved_.lastBackup)) {
-      SessionState other = ReadProject(newest->path).state;
-      for (SessionVolume& volume : other.volumes) {
-        const std::string found = FindVolume(newest->path, volume.file, folders);
-        volume.file = found.empty() ? volume.file : ResolvedPath(found);
-      }
-      return SameWork(state, other) ? std::string() : newest->path;
+      Project other = ReadProject(newest->path);
+      const auto find = [&](std::string& file) {
+        const std::string found = FindVolume(newest->path, file, folders);
+        file = found.empty() ? file : ResolvedPath(found);
+      };
+      for (SessionVolume& volume : other.state.volumes)
+        find(volume.file);
+      find(other.truth);
+      return SameWork(now.state, other.state) && SameNotes(now, other) ? std::string() : newest->path;
     }
   } catch (const Error&) { // it went meanwhile
   }

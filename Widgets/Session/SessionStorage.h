@@ -51,11 +51,11 @@ public:
   bool EndsUnfinished() const { return isUnfinished_; }
   /// Whether this is a project that was just opened: it is its own backup; another would be later than the last work that was not
   /// saved.
-  bool IsFresh(const SessionState& state) const { return !writer_ && state == saved_.state; }
+  bool IsFresh(const Project& now) const { return !writer_ && now == saved_; }
   /// All that were made, the newest first. \a trouble receives why one could not be written, told once.
   std::vector<Backup> List(std::string& trouble) const;
-  /// The newest readable one, when it is later than the project file and is other work than \a state. Empty: there is none.
-  std::string LaterBackup(const SessionState& state, const std::vector<std::string>& folders) const;
+  /// The newest readable one, when it is later than the project file and is other work than \a now. Empty: there is none.
+  std::string LaterBackup(const Project& now, const std::vector<std::string>& folders) const;
 
   /// Folders of sessions that ended without being saved, the newest first.
   static std::vector<std::string> Abandoned();

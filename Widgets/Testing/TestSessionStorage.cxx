@@ -101,10 +101,17 @@ TEST_F(SessionOnDisk, ALaterBackupIsOfOtherWork)
   SessionStorage storage;
   storage.Save(Path("p.json"), Step(1));
   storage.BackUp(Step(1), "the same", true);
-  EXPECT_EQ(storage.LaterBackup(Step(1).state, {}), "");
+  EXPECT_EQ(storage.LaterBackup(Step(1), {}), "");
   storage.BackUp(Step(2), "later", true);
-  EXPECT_EQ(ReadProject(storage.LaterBackup(Step(1).state, {})).state.volumes[0].volumeToWorld.translation().x(), 2.0);
-  EXPECT_EQ(storage.LaterBackup(Step(2).state, {}), "");
+  EXPECT_EQ(ReadProject(storage.LaterBackup(Step(1), {})).state.volumes[0].volumeToWorld.translation().x(), 2.0);
+  EXPECT_EQ(storage.LaterBackup(Step(2), {}), "");
+  Project noted = Step(2);
+  noted.comment = "for people";
+  storage.BackUp(noted, "another comment", true);
+  EXPECT_EQ(ReadProject(storage.LaterBackup(Step(2), {})).comment, "for people");
+  EXPECT_EQ(storage.LaterBackup(noted, {}), "");
+  noted.truths[noted.state.volumes[0].name] = Pose::Identity();
+  EXPECT_NE(storage.LaterBackup(noted, {}), "") << "another truth";
 }
 
 TEST_F(SessionOnDisk, WhatIsLaterDoesNotDependOnTheClock)
@@ -113,7 +120,7 @@ TEST_F(SessionOnDisk, WhatIsLaterDoesNotDependOnTheClock)
   const auto later = [this](const std::string& project, int open) { // for who opens it now; 0: nothing
     SessionStorage storage;
     storage.Opened(project, ReadProject(project), SessionStorage::FingerprintOf(project));
-    const std::string found = storage.LaterBackup(Step(open).state, {});
+    const std::string found = storage.LaterBackup(Step(open), {});
     return found.empty() ? 0 : static_cast<int>(ReadProject(found).state.volumes[0].volumeToWorld.translation().x());
   };
   // The clock was a day ahead when that was written.
@@ -180,7 +187,7 @@ TEST_F(SessionOnDisk, TimesTellWhatIsLaterThanAFileThatKnowsNoBackup)
   const auto open = [&] {
     SessionStorage storage;
     storage.Opened(path, ReadProject(path), SessionStorage::FingerprintOf(path));
-    return storage.LaterBackup(Step(1).state, {});
+    return storage.LaterBackup(Step(1), {});
   };
   SessionStorage storage;
   storage.Opened(path, ReadProject(path), SessionStorage::FingerprintOf(path));
@@ -201,7 +208,7 @@ TEST_F(SessionOnDisk, ABackupOfTheSecondInWhichTheProjectWasSavedIsLaterOnlyWhen
     storage.BackUp(Step(step), "earlier", true);
     std::this_thread::sleep_for(std::chrono::milliseconds(20)); // file systems tell times by ticks
     storage.Save(Path("p.json"), Step(step + 1));
-    EXPECT_EQ(storage.LaterBackup(Step(step + 1).state, {}), "");
+    EXPECT_EQ(storage.LaterBackup(Step(step + 1), {}), "");
   }
 }
 

@@ -823,6 +823,63 @@ session.TranslateSelection(3, 0, 0)
         session.OpenProject(project)
         self.assertNotEqual(session.GetLaterBackup(), "")
 
+    def test_comment_and_truth_survive_a_kill_as_well(self):
+        project, found = str(self.folder / "p.json"), vtkMatrix4x4()
+        saved = self.opened()
+        saved.WritePoses(str(self.folder / "truth.json"))
+        saved.SaveProject(project)
+
+        def restored():
+            """What the next start has."""
+            session = self.session()
+            self.assertTrue(session.OpenProject(project))
+            self.assertEqual((session.GetComment(), session.HasTruth()), ("", False))
+            self.assertTrue(session.RestoreBackup(session.GetLaterBackup()), self.errors)
+            self.assertEqual(session.GetLaterBackup(), "", "it is here now")
+            self.assertTrue(session.GetModifiedSinceSave())
+            return session
+
+        self.run_and_kill("""
+session.OpenProject(folder + "/p.json")
+session.SetComment("x")
+""")
+        session = restored()
+        self.assertEqual((session.GetComment(), session.HasTruth(), session.GetUndoCount()), ("x", False, 0))
+        self.run_and_kill("""
+session.OpenProject(folder + "/p.json")
+session.ReadTruth(folder + "/truth.json")
+""")
+        session = restored()
+        self.assertEqual((session.GetComment(), session.HasTruth()), ("", True))
+        session = self.session()
+        session.OpenProject(project)
+        session.SetComment("y")
+        one, two = ids(session)
+        session.ReadTruth(str(self.folder / "truth.json"))
+        session.SetTruth(one, shift(2))
+        session.Select(one)
+        session.TranslateSelection(1, 0, 0)
+        self.assertTrue(session.BackUp())
+        session = restored()
+        one, two = ids(session)
+        self.assertEqual((session.GetComment(), pose(session, one)[0, 3]), ("y", 1))
+        self.assertEqual([(session.GetTruth(i, found), found.GetElement(0, 3)) for i in (one, two)], [(True, 2), (True, 0)])
+        self.assertAlmostEqual(session.GetVolumeScore(two), 1, 12)
+        session.Undo()
+        self.assertEqual((session.GetComment(), pose(session, one)[0, 3]), ("y", 0))
+
+        # A project that was opened with both makes no backup.
+        session.SaveProject(project)
+        count = len(backups(session))
+        session = self.session()
+        session.SetAutomaticBackups(True)
+        self.assertTrue(session.OpenProject(project))
+        self.assertEqual((session.HasTruth(), session.GetModifiedSinceSave(), len(backups(session))), (True, False, count))
+        session.ClearTruth()
+        session.SetComment("z")
+        self.assertEqual([label for _, label, _ in backups(session)][:2], ["Change comment", "Change truth"])
+        self.assertEqual(self.errors, [])
+
     def test_what_is_kept_of_a_session_that_was_never_saved(self):
         def left():
             folders = vtkStringArray()
