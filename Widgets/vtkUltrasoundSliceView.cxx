@@ -66,6 +66,7 @@ struct vtkUltrasoundSliceView::Internals {
   PlanePicture Laid;
   SliceLines Lines{Renderer};
   vtkSmartPointer<vtkImageData> Shifts; ///< a map that is laid over the picture
+  vtkMTimeType ShiftsTime = 0;
   double ShiftsMm = 1.0;
 
   explicit Internals(vtkUltrasoundSliceView* view) : View(view), Frame(view->Frame)
@@ -369,9 +370,11 @@ void vtkUltrasoundSliceView::Zoom(double factor, double pixelX, double pixelY)
 {
   EchoramaRequire(factor > 0.0 && Finite(factor, pixelX, pixelY),
                   "the zoom factor of a slice view is " << factor << "; it must be above 0, and the pixel finite");
+  const double mm = std::clamp(this->Frame.mmPerPixel / factor, FinestMm, CoarsestMm);
   const Vector3d kept = this->Frame.WorldOf(pixelX, pixelY);
-  this->SetMillimetresPerPixel(std::clamp(this->Frame.mmPerPixel / factor, FinestMm, CoarsestMm));
-  this->Frame.focus += kept - this->Frame.WorldOf(pixelX, pixelY);
+  // The focus first: who hears that the zoom has changed may draw at once.
+  this->Frame.focus += (1.0 - mm / this->Frame.mmPerPixel) * (kept - this->Frame.focus);
+  this->SetMillimetresPerPixel(mm);
 }
 
 void vtkUltrasoundSliceView::Pan(double pixelsX, double pixelsY)
@@ -540,8 +543,11 @@ void vtkUltrasoundSliceView::SetShifts(vtkImageData* map, double mostMm, bool st
   EchoramaRequire(!map || vtkFloatArray::SafeDownCast(map->GetPointData()->GetScalars()),
                   "a map of shifts needs floats, of which those that are NaN are not known");
   Internals& parts = *this->Parts;
-  if (map != parts.Shifts || (map && (mostMm != parts.ShiftsMm || stale != parts.Lines.IsLegendStale))) {
+  const vtkMTimeType time = map ? map->GetMTime() : 0; // with its values: a filter that has run again has the same output
+  if (map != parts.Shifts ||
+      (map && (time != parts.ShiftsTime || mostMm != parts.ShiftsMm || stale != parts.Lines.IsLegendStale))) {
     parts.Shifts = map;
+    parts.ShiftsTime = time;
     parts.ShiftsMm = mostMm;
     parts.Lines.IsLegendStale = stale;
     this->Outdate();

@@ -198,7 +198,7 @@ public:
   ///@}
 
   /** Lays a map of lengths in mm (one float per voxel, NaN: not known) over the picture, with a legend from 0 to \a mostMm;
-   * stale: faint, and the legend says so. nullptr: none. */
+   * stale: faint, and the legend says so. nullptr: none. Call it again when its values have changed. */
   void SetShifts(vtkImageData* map, double mostMm = 1.0, bool stale = false);
 
   ///@{

@@ -267,6 +267,15 @@ class SliceView(unittest.TestCase):
         self.assertLess(np.abs(self.picture().astype(int) - plain).sum(), np.abs(laid.astype(int) - plain).sum())
         view.SetShifts(None)
         np.testing.assert_array_equal(self.picture(), plain)
+        view.SetShifts(shifts, 2.0)
+        np.testing.assert_array_equal(self.picture(), laid)
+        values = shifts.GetPointData().GetScalars()  # a filter that has run again has the same output
+        values.Fill(2.0)
+        values.Modified()
+        view.SetShifts(shifts, 2.0)
+        self.assertFalse(np.array_equal(self.picture(), laid))
+        view.SetShifts(shifts, 2.0)
+        self.assertFalse(view.Update(), "nothing has changed")
 
     def world(self, x, y):
         place = [0.0] * 3
@@ -312,6 +321,12 @@ class SliceView(unittest.TestCase):
         np.testing.assert_allclose(array_of(view.PixelToWorld, 3, 40, 50), world, atol=1e-9)
         view.Pan(7, -3)
         np.testing.assert_allclose(array_of(view.PixelToWorld, 3, 47, 47), world, atol=1e-9)
+        view.Update()
+        tag = view.AddObserver(vtkCommand.ModifiedEvent, lambda *_: view.Update())  # who draws at once sees the same
+        view.Zoom(2.0, 10, 10)
+        view.RemoveObserver(tag)
+        view.Update()
+        np.testing.assert_allclose(view.GetPicture().GetOrigin(), array_of(view.PixelToWorld, 3, 0, 0), atol=1e-9)
         for axis, low, high in (("z", -12.5, 19.5), ("x", -20.5, 19.5)):
             view.SetAxis(axis)
             np.testing.assert_allclose(array_of(view.GetPositionRange, 2), (low, high))
