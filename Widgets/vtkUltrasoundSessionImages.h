@@ -240,6 +240,7 @@ public:
       throw Error(Error::Kind::NotPossible, "no stroke was begun");
     }
     if (this->Drawn.pathMm.empty()) {
+      this->DropStroke();
       this->Session.End();
       return;
     }

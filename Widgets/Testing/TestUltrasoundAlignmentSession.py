@@ -369,6 +369,14 @@ class Session(unittest.TestCase):
         self.refuses(session, "finite", session.ExtendStroke, math.nan, 0, 0)
         session.EndStroke() # nothing was painted
         self.assertEqual(session.GetUndoCount(), entries)
+        session.BeginEdit("both")
+        for _ in range(2): # nor here, and the edit around it goes on
+            self.assertTrue(session.BeginStroke(*stroke), self.errors)
+            self.assertTrue(session.EndStroke())
+        session.SetOpacity(one, 0.5)
+        self.assertTrue(session.EndEdit())
+        self.assertEqual((session.GetUndoCount(), session.GetUndoLabel()), (entries + 1, "both"))
+        session.Undo()
         session.BeginStroke(*stroke)
         session.ExtendStroke(*middle)
         self.refuses(session, "during an edit", session.Undo)
