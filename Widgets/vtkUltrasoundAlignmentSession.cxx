@@ -394,7 +394,8 @@ std::vector<std::string> vtkUltrasoundAlignmentSession::Folders() const
 //----------------------------------------------------------------------------
 Project vtkUltrasoundAlignmentSession::Notes() const
 {
-  return {{}, this->Truth.File(), this->Comment, this->Truth.ByHand(this->Session.State())};
+  const SessionState& state = this->Session.State();
+  return {{}, this->Truth.File(), this->Comment, this->Truth.ByHand(state), this->Truth.FixedName(state)};
 }
 
 //----------------------------------------------------------------------------
@@ -421,6 +422,7 @@ void vtkUltrasoundAlignmentSession::TakeNotes(const std::string& path, const Pro
       this->Try([&] { this->Truth.SetByHand(volume, byHand->second, this->PointsOf); });
     }
   }
+  this->Truth.SetFixedName(project.fixed, this->Session.State());
 }
 
 //----------------------------------------------------------------------------

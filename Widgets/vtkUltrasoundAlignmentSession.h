@@ -342,7 +342,8 @@ public:
 
   ///@{
   /** The truth: a pose file that names the volumes. The score (mm, dissertation 4.4.2) follows poses at once: NaN without truth
-   * or with fewer than two volumes that have one. FixedVolume: on which both agree, default the first that has a truth. */
+   * or with fewer than two volumes that have one. FixedVolume: on which both agree, default the first that has a truth. A project
+   * keeps it. */
   bool ReadTruth(const char* path)
   {
     return this->DoTruth([&] { this->Truth.Read(path ? path : "", this->Session.State(), this->PointsOf); });

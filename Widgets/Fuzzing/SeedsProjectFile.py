@@ -23,7 +23,7 @@ seeds = {
     "twice": {**head, "volumes": [first, {**second, "name": "A"}]},
     "pipeline": {**head, "volumes": [{**first, "file": ""}]},
     "result": {**head, "centreOfRotation": [1, 2, 3], "volumes": [
-        {**first, "TrueVolumeToWorld": unit}, {**second, "name": "B"},
+        {**first, "TrueVolumeToWorld": unit, "fixed": True}, {**second, "name": "B"},
         {"name": "whole", "file": "", "geometry": geometry, "VolumeToWorld": turned, "madeOf": {"options": {"Stitch.Method": "membrane"}, "sources": [
             {"name": "A", "file": "a.mha", "geometry": geometry, "VolumeToResult": turned, "strokes": "0123456789abcdef", "making": ""},
             {"name": "B", "geometry": geometry, "VolumeToResult": unit}]}}]},

@@ -286,7 +286,7 @@ bool SameTruths(const std::map<std::string, Pose>& a, const std::map<std::string
 
 bool SameNotes(const Project& a, const Project& b)
 {
-  return a.truth == b.truth && a.comment == b.comment && SameTruths(a.truths, b.truths);
+  return a.truth == b.truth && a.comment == b.comment && SameTruths(a.truths, b.truths) && a.fixed == b.fixed;
 }
 
 bool operator==(const Project& a, const Project& b)
@@ -326,6 +326,11 @@ Project ReadProject(const std::string& path, BackupStamp* stamp)
       volume.name = wanted + " (" + std::to_string(copy) + ")";
     if (value.contains("TrueVolumeToWorld"))
       project.truths[volume.name] = PoseJson::ToPose(value["TrueVolumeToWorld"], place.In("TrueVolumeToWorld"));
+    if (value.contains("fixed") && YesOrNo(value["fixed"], place.In("fixed"))) {
+      if (!project.fixed.empty())
+        place.In("fixed").Fail(project.fixed + " is the fixed volume already");
+      project.fixed = volume.name;
+    }
     project.state.volumes.push_back(std::move(volume));
   }
   if (root.contains("centreOfRotation"))
@@ -377,6 +382,8 @@ std::string TextOf(const Project& project, const std::string& path, const Backup
       volumes.back()["madeOf"] = MadeOfJson::Of(*volume.madeOf);
     if (const auto truth = project.truths.find(volume.name); truth != project.truths.end())
       volumes.back()["TrueVolumeToWorld"] = JsonPlace::RowsOf(truth->second.matrix());
+    if (volume.name == project.fixed)
+      volumes.back()["fixed"] = true;
   }
   Json measurements = Json::array();
   for (const Measurement& each : project.state.measurements) {

@@ -24,6 +24,7 @@ struct Project {
   std::string truth;                    ///< pose file of the ground truth, absolute, or empty
   std::string comment;                  ///< for people: who, what
   std::map<std::string, Pose> truths{}; ///< of volumes, by name, that were set by hand: they count more than the file's
+  std::string fixed{};                  ///< the name of the volume that was chosen as the fixed one of the score, or empty
   LastBackup lastBackup{};              ///< when the file was written
 };
 
@@ -42,9 +43,9 @@ struct BackupStamp {
 
 /// A project on disk: {"schema": "echorama-project-1", "unit": "mm", "frame": "LPS", "volumes": [{"name", "file", "path",
 /// "geometry", "VolumeToWorld", "colour", "opacity", "visible", "group", "strokes": [{"mode", "radiusMm", "intensity", "opacity",
-/// "hardness", "insideValid", "pathMm": [[3], ...]}], "landmarks": [{"label", "position": [3]}], "madeOf", "TrueVolumeToWorld"}],
-/// "measurements": [{"number", "points": [[3], ...]}], "truth", "comment", "centreOfRotation", "lastBackup": {"lineage",
-/// "number"}}. Documentation/session.md tells of each.
+/// "hardness", "insideValid", "pathMm": [[3], ...]}], "landmarks": [{"label", "position": [3]}], "madeOf", "TrueVolumeToWorld",
+/// "fixed"}], "measurements": [{"number", "points": [[3], ...]}], "truth", "comment", "centreOfRotation", "lastBackup":
+/// {"lineage", "number"}}. Documentation/session.md tells of each.
 ///
 /// A project is a pose file too (ReadPoses reads it): the same fields with the same meaning, plus what a session knows. And a
 /// pose file ("echorama-poses-1") is a project whose volumes have default looks: all keys of a volume but "file" and

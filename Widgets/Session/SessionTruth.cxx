@@ -83,6 +83,21 @@ int SessionTruth::Fixed(const SessionState& state) const
   return -1;
 }
 
+std::string SessionTruth::FixedName(const SessionState& state) const
+{
+  const SessionVolume* fixed = state.Find(fixed_);
+  return fixed ? fixed->name : std::string();
+}
+
+void SessionTruth::SetFixedName(const std::string& name, const SessionState& state)
+{
+  fixed_ = -1;
+  for (const SessionVolume& volume : state.volumes)
+    if (volume.name == name)
+      fixed_ = volume.id;
+  Outdate();
+}
+
 const LiveScoreResult* SessionTruth::Score(const SessionState& state) const
 {
   if (!isCurrent_) {

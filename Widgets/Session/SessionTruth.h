@@ -41,6 +41,10 @@ public:
   /// On which volume both agree; -1: the first that has a truth. \throws Error(InvalidParameter) when it has none.
   void SetFixed(int id);
   int Fixed(const SessionState& state) const; ///< -1: none has a truth
+  ///@{ The name of the one that was chosen, for a project; empty: none was. A truth that is missing now may come later.
+  std::string FixedName(const SessionState& state) const;
+  void SetFixedName(const std::string& name, const SessionState& state);
+  ///@}
 
   /// nullptr: there is none, without truth or with fewer than two volumes that have one. Valid until something changes.
   const LiveScoreResult* Score(const SessionState& state) const;

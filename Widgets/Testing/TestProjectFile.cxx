@@ -47,12 +47,14 @@ TEST_F(ProjectFile, EveryBitComesBack)
     EXPECT_EQ(back.truth, project.truth);
     EXPECT_EQ(back.comment, project.comment);
   }
+  EXPECT_EQ(Text(Path("p.json")).find("fixed"), std::string::npos) << "none was chosen";
   Project extreme = SomeProject(3, Path());
   extreme.state.volumes[0].volumeToWorld.translation() = Eigen::Vector3d(-0.0, 5e-324, 1.7976931348623157e308);
   extreme.state.volumes[1].name = "\u00e4\u6f22 \\ \n";
   extreme.state.volumes[1].landmarks = {{"apex \"", {1.0 / 3.0, -0.0, 5e-324}}, {"2", {1, 2, 3}}};
+  extreme.fixed = extreme.state.volumes[1].name;
   WriteProject(Path("p.json"), extreme);
-  EXPECT_TRUE(ReadProject(Path("p.json")).state == extreme.state);
+  EXPECT_TRUE(ReadProject(Path("p.json")) == extreme);
   EXPECT_TRUE(std::signbit(ReadProject(Path("p.json")).state.volumes[0].volumeToWorld.translation().x()));
   WriteProject(Path("p.json"), Project());
   EXPECT_TRUE(ReadProject(Path("p.json")).state.volumes.empty());
@@ -143,6 +145,10 @@ TEST_F(ProjectFile, RefusesWhatIsNotAProject)
   ExpectRefused(landmarks("[{\"label\": \"\", \"position\": [1, 2, 3]}]"), "landmark 1, label");
   ExpectRefused(landmarks("[{\"label\": \"a\", \"position\": [1, 2, 3]}, {\"label\": \"a\", \"position\": [1, 2, 3]}]"),
                 "landmark 2, label");
+  std::string fixed = With("\"group\": 0", "\"group\": 0, \"fixed\": true");
+  fixed.replace(fixed.find("\"group\": 4"), 10, "\"group\": 4, \"fixed\": true");
+  ExpectRefused(fixed, "volume 2, fixed: volume \"0\" is");
+  ExpectRefused(With("\"group\": 0", "\"group\": 0, \"fixed\": 1"), "volume 1, fixed");
   ExpectRefused(With("v1.mha", "v0.mha"), "v0.mha is named twice");
   ExpectRefused(With("volume \\\"1", "volume \\\"0"), "another volume");
   ExpectRefused(With("\"comment\": \"", "\"comment\": 3, \"x\": \""), "comment");

@@ -56,6 +56,12 @@ TEST_F(TruthFolder, TheScoreFollowsPosesWhenItIsTold)
   EXPECT_NEAR(truth.MeanOf(4, state), 5.0, 1e-12);
   EXPECT_THROW(truth.SetFixed(6), Error);
   EXPECT_EQ(truth.Fixed(state), 5);
+  EXPECT_EQ(truth.FixedName(state), "b.mha");
+  truth.SetFixedName("c.mha", state);
+  EXPECT_EQ(truth.Fixed(state), 4) << "its truth may come later";
+  EXPECT_EQ(truth.FixedName(state), "c.mha");
+  truth.SetFixedName("", state);
+  EXPECT_EQ(truth.FixedName(state), "");
 }
 
 TEST_F(TruthFolder, AVolumeThatComesLaterHasItsTruth)
