@@ -8,17 +8,18 @@ from pathlib import Path
 folder = Path(sys.argv[1])
 
 
-def nifti1(end="<", dim=(3, 2, 2, 2, 1, 1, 1, 1), datatype=2, codes=(0, 1), slope=0.0, extension=b"", data=bytes(8)):
+def nifti1(end="<", dim=(3, 2, 2, 2, 1, 1, 1, 1), datatype=2, codes=(0, 1), slope=0.0, extension=b"", data=bytes(8), units=10, step=0.5,
+           mirror=1):
     header = bytearray(348)
     struct.pack_into(end + "i", header, 0, 348)
     struct.pack_into(end + "8h", header, 40, *dim)
     struct.pack_into(end + "h", header, 70, datatype)
-    struct.pack_into(end + "8f", header, 76, -1, 1, 2, 3, 0.5, 0, 0, 0)
+    struct.pack_into(end + "8f", header, 76, -1, 1, 2, 3, step, 0, 0, 0)
     struct.pack_into(end + "3f", header, 108, 352 + len(extension), slope, 1)
-    header[123] = 10
+    header[123] = units
     struct.pack_into(end + "2h", header, 252, *codes)
     struct.pack_into(end + "6f", header, 256, 0.1, 0.2, 0.3, 1, 2, 3)
-    struct.pack_into(end + "12f", header, 280, -1, 0, 0, 5, 0, 2, 0, 6, 0, 0, 3, 7)
+    struct.pack_into(end + "12f", header, 280, -1, 0, 0, 5, 0, 2, 0, 6, 0, 0, 3 * mirror, 7)
     header[344:348] = b"n+1\0"
     return bytes(header) + (b"\1\0\0\0" if extension else bytes(4)) + extension + data
 
@@ -41,6 +42,8 @@ ours = struct.pack("<ii", len(comment) + 8, 6) + comment
 seeds = {
     "sform": nifti1(), "qform": nifti1(codes=(1, 0)), "neither": nifti1(codes=(0, 0)), "big": nifti1(">"),
     "times": nifti1(dim=(4, 2, 2, 2, 3, 1, 1, 1), data=bytes(24)), "scaled": nifti1(slope=0.5), "second": nifti2(),
+    "milliseconds": nifti1(dim=(4, 2, 2, 2, 3, 1, 1, 1), data=bytes(24), units=18),
+    "metres": nifti1(dim=(4, 2, 2, 2, 3, 1, 1, 1), data=bytes(24), units=25, step=0), "left": nifti1(mirror=-1),
     "extension": nifti1(extension=ours), "gz": gzip.compress(nifti1(extension=ours), mtime=0),
     "gzTimes": gzip.compress(nifti1(dim=(4, 2, 2, 2, 3, 1, 1, 1), data=bytes(24)), mtime=0), "cut": nifti1()[:-3],
 }

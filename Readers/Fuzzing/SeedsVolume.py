@@ -34,8 +34,55 @@ encoding: {encoding}
 key:=value\\nof two lines
 
 """
+spaced = """NRRD0005
+type: short
+dimension: {dimension}
+sizes: {sizes}
+{lines}
+endian: little
+encoding: raw
+
+"""
+old = """ObjectType = Image
+NDims = {axes}
+BinaryData = {binary}
+ElementByteOrderMSB = False
+Rotation = {rotation}
+Position = {position}
+{lines}
+ElementSize = {spacing}
+DimSize = {sizes}
+ElementType = MET_UCHAR
+ElementDataFile = LOCAL
+"""
+
+
+def planar(lines, binary=True):
+    return old.format(axes=2, binary=binary, rotation="1 0 0 1", position="1 2", lines=lines, spacing="0.5 0.7", sizes="10 6").encode()
+
+
+def solid(lines, rotation):
+    return old.format(axes=3, binary=True, rotation=rotation, position="1 2 3", lines=lines, spacing="0.5 0.7 1", sizes="5 4 3").encode()
+
+
+def lined(lines, sizes="5 4 3"):
+    return spaced.format(dimension=len(sizes.split()), sizes=sizes, lines=lines).encode() + voxels * 2
+
+
 gzip = zlib.compressobj(wbits=31)
+turned = "space directions: (0,0.5,0) (0.5,0,0) (0,0,0.7)"
 seeds = {
+    "spaced.nrrd": lined('units: "cm" "mm" "um"\nspacings: 0.5 0.5 0.7\naxis mins: 1 2 3\ncenterings: cell node cell\nbyte skip: -1'),
+    "ends.nrrd": lined("axis mins: 0 0 0\naxis maxs: 4 4 3\ncenters: node cell cell\nkinds: domain space ???"),
+    "one_number.nrrd": lined("kinds: vector domain domain domain\nspacings: nan 1 2 3", "1 5 4 3"),
+    "fourth.nrrd": lined("spacings: 1 2 3 1", "5 4 3 1"),
+    "plane.nrrd": lined("spacings: 1 2\nbyte skip: 20", "10 5"),
+    "left.nrrd": lined(turned + '\nspace: LAS\nspace units: "cm" "cm" "cm"\nspace origin: (1,2,3)\nspacings: nan nan nan'),
+    "skipped.nrrd": nrrd.format(type="uint8", space="LPS", endian="little", encoding="raw\nline skip: 2").encode() + b"a\nb\n" + voxels,
+    "left.mha": solid("DistanceUnits = cm", "0 1 0 1 0 0 0 0 1") + voxels,
+    "sized.mha": solid("HeaderSize = -1\nElementNumberOfChannels = 1", "1 0 0 0 1 0 0 0 1") + voxels,
+    "plane.mha": planar("DistanceUnits = um") + voxels,
+    "text.mha": planar("Comment = numbers", False) + b" ".join(b"%d" % v for v in voxels),
     "plain.mha": meta.format(compressed=False, type="MET_UCHAR").encode() + voxels,
     "zlib.mha": meta.format(compressed=True, type="MET_UCHAR").encode() + zlib.compress(voxels),
     "short.mha": meta.format(compressed=False, type="MET_SHORT").encode() + voxels * 2,
