@@ -389,7 +389,8 @@ bool TissuePress::Walk(std::size_t n, const Pose& from, const Pose& to, const Pr
     if (lastSize > 0.0) // it goes on as it went
       for (std::size_t m = 0; m < last.Data().size(); ++m)
         solver.Displacement().Data()[m] += size / lastSize * (now.displacement.Data()[m] - last.Data()[m]);
-    solver.Contact().BeginStep(now.displacement); // where the probe was
+    solver.Contact().Place(shape_, Interpolate(from, to, at), parameters_.friction); // not where a part that failed had it
+    solver.Contact().BeginStep(now.displacement);
     solver.Contact().Place(shape_, Interpolate(from, to, next), parameters_.friction);
     TissueWork work;
     work.loadSteps = 1;

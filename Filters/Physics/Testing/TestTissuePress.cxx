@@ -209,6 +209,22 @@ TEST(TissuePress, FrictionDragsTissueAlongUpToItsBound)
   EXPECT_GT(sticking.x(), 0.1 * sticking.z());
 }
 
+TEST(TissuePress, SmallMovesWithFrictionArrive)
+{
+  // In some the whole step on the finest lattice fails and parts of it are taken, from where the probe was.
+  const TissueBody body = Block({17, 17, 11}, {60, 60, 38}, Tissue(20.0, 0.45));
+  TissuePressParameters parameters;
+  parameters.friction = 0.5;
+  TissuePress press(body, parameters);
+  const auto probe = Convex();
+  press.Move(probe, PoseAt(22.0, 30.0, 3.0));
+  for (int move = 1; move <= 20; ++move) {
+    ASSERT_NO_THROW(press.Move(probe, PoseAt(22.0 + 0.7 * move, 30.0, 3.0 + 0.45 * move))) << move;
+    EXPECT_GT(press.Force().x(), 0.0) << move;
+    EXPECT_LT(press.Force().x(), 0.5 * press.Force().z()) << move;
+  }
+}
+
 TEST(TissuePress, ProbeAtTheEdgeOfTheTissue)
 {
   const TissueBody body = Block({17, 17, 11}, {60, 60, 38}, Tissue(20.0, 0.45));
