@@ -304,9 +304,9 @@ class MainJob(unittest.TestCase):
     def test_a_dry_run_replaces_nothing(self):
         poses = work / "precious.json"
         poses.write_text("precious")
-        write_poses(work / "none.json", volumes(), [numpy.eye(4)] * 3)
-        run("convert", work / "none.json", work / "none.tfm")
-        for option in (["--transforms", "-", work / "none.volume_2.tfm", "--transforms-only"], ["--tracker", "x.csv", "--calibration", "x.json", "--tracker-only"]):
+        write_poses(work / "identities.json", volumes(), [numpy.eye(4)] * 3)
+        run("convert", work / "identities.json", work / "identities.tfm")
+        for option in (["--transforms", "-", work / "identities.volume_2.tfm", "--transforms-only"], ["--tracker", "x.csv", "--calibration", "x.json", "--tracker-only"]):
             done = run("align", *volumes()[:2], "-o", poses, "--dry-run", *option)
             self.assertEqual(done.returncode, 2, done.stderr)
             self.assertIn("--dry-run", done.stderr)

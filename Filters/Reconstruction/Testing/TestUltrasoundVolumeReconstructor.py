@@ -308,6 +308,7 @@ def test_live_is_as_the_whole():
     # The scanner changes its format while the tracker has lost the probe: refused, and the sector is that of the next one with a pose.
     larger = np.ones((80, 100), np.float32)
     refused = live.GetFramesRefused()
+    heard.clear()
     assert not live.AddFrame(frame(larger, np.zeros((4, 4))))
     assert live.GetFramesRefused() == refused + 1 and "singular" in live.GetReport() and not heard, (live.GetReport(), heard)
     assert live.AddFrame(frame(larger, poses[0])), live.GetReport()
