@@ -242,7 +242,9 @@ public:
   enum Samplings { RANDOM = 0, STRATIFIED = 1, SOBOL = 2 };
 
   ///@{
-  /** How the rays of an element are spread. Default stratified. There are RANDOM, STRATIFIED, SOBOL. */
+  /**
+   * How the rays of an element are spread. Used when Mode is coherent. Default stratified. There are RANDOM, STRATIFIED, SOBOL.
+   */
   vtkUltrasoundChoiceMacro(Sampling);
   void SetSamplingToRandom() { this->SetSampling(RANDOM); }
   void SetSamplingToStratified() { this->SetSampling(STRATIFIED); }
