@@ -392,13 +392,6 @@ std::vector<std::string> vtkUltrasoundAlignmentSession::Folders() const
 }
 
 //----------------------------------------------------------------------------
-Project vtkUltrasoundAlignmentSession::Notes() const
-{
-  const SessionState& state = this->Session.State();
-  return {{}, this->Truth.File(), this->Comment, this->Truth.ByHand(state), this->Truth.FixedName(state)};
-}
-
-//----------------------------------------------------------------------------
 Project vtkUltrasoundAlignmentSession::Now() const
 {
   Project now = this->Notes();
@@ -468,14 +461,6 @@ bool vtkUltrasoundAlignmentSession::SaveProject(const char* path, bool withoutUn
 }
 
 //----------------------------------------------------------------------------
-void vtkUltrasoundAlignmentSession::Warn(const std::string& text)
-{
-  if (!text.empty()) {
-    vtkWarningMacro(<< text);
-  }
-}
-
-//----------------------------------------------------------------------------
 bool vtkUltrasoundAlignmentSession::GetProjectFiles(const char* path, vtkStringArray* files)
 {
   return this->Change([&]() {
@@ -488,13 +473,6 @@ bool vtkUltrasoundAlignmentSession::GetProjectFiles(const char* path, vtkStringA
       }
     }
   });
-}
-
-//----------------------------------------------------------------------------
-bool vtkUltrasoundAlignmentSession::GetModifiedSinceSave() const
-{
-  const Project& saved = this->Storage.Saved();
-  return this->Session.State() != saved.state || !SameNotes(this->Notes(), saved);
 }
 
 //----------------------------------------------------------------------------
@@ -514,20 +492,6 @@ bool vtkUltrasoundAlignmentSession::ReadPoses(const char* path)
 bool vtkUltrasoundAlignmentSession::WritePoses(const char* path)
 {
   return this->Change([&]() { WritePosesOf(this->Session.State(), TextOf(path)); });
-}
-
-//----------------------------------------------------------------------------
-void vtkUltrasoundAlignmentSession::TellTrouble(const std::string& trouble)
-{
-  if (!trouble.empty()) {
-    vtkErrorMacro("there is no new backup: " << trouble);
-  }
-}
-
-//----------------------------------------------------------------------------
-void vtkUltrasoundAlignmentSession::BackUpInTheBackground(const std::string& label)
-{
-  this->TellTrouble(this->Storage.Post(this->Now(), label, !this->Session.Editing()));
 }
 
 //----------------------------------------------------------------------------

@@ -294,7 +294,11 @@ public:
     }
   }
   std::string GetProjectPath() const { return this->Storage.ProjectPath(); } ///< empty: never saved
-  bool GetModifiedSinceSave() const;
+  bool GetModifiedSinceSave() const
+  {
+    const echorama::Project& saved = this->Storage.Saved();
+    return this->Session.State() != saved.state || !SameNotes(this->Notes(), saved);
+  }
   /** For people: who, what. Saved with the project. */
   std::string GetComment() const { return this->Comment; }
   void SetComment(const char* comment)
@@ -449,10 +453,28 @@ private:
     return done;
   }
   int AddNew(vtkImageData* image, echorama::SessionVolume volume);
-  void BackUpInTheBackground(const std::string& label);
-  void TellTrouble(const std::string& trouble);
-  void Warn(const std::string& text); ///< unless it is empty
-  echorama::Project Notes() const;    ///< what a project holds beside the state
+  void BackUpInTheBackground(const std::string& label)
+  {
+    this->TellTrouble(this->Storage.Post(this->Now(), label, !this->Session.Editing()));
+  }
+  void TellTrouble(const std::string& trouble)
+  {
+    if (!trouble.empty()) {
+      vtkErrorMacro("there is no new backup: " << trouble);
+    }
+  }
+  void Warn(const std::string& text) ///< unless it is empty
+  {
+    if (!text.empty()) {
+      vtkWarningMacro(<< text);
+    }
+  }
+  /** What a project holds beside the state. */
+  echorama::Project Notes() const
+  {
+    const echorama::SessionState& state = this->Session.State();
+    return {{}, this->Truth.File(), this->Comment, this->Truth.ByHand(state), this->Truth.FixedName(state)};
+  }
   /** Those of the project \a path, whose volumes are here. */
   void TakeNotes(const std::string& path, const echorama::Project& project);
   std::vector<std::string> Folders() const;
