@@ -277,8 +277,10 @@ class MainJob(unittest.TestCase):
 
         # Another run that has written them meanwhile keeps them.
         (folder / "poses.json").unlink()
+        untouched = folder.stat().st_mtime_ns
         process = started(folder, "align", *files)
-        time.sleep(0.3)  # it has looked for the name, and aligns
+        while process.poll() is None and folder.stat().st_mtime_ns == untouched:
+            time.sleep(0.01)  # until it has looked for the name and tried to write there; then it aligns
         (folder / "poses.json").write_text("of another run")
         _, messages = process.communicate(timeout=300)
         self.assertEqual(process.returncode, 0, messages)

@@ -111,9 +111,7 @@ void Write(Session& session, const AlignOptions& options, const std::vector<Load
   for (std::size_t i = 0; i < poses.size(); ++i)
     if (!poses[i].displacement.empty()) // as it will be named
       poses[i].displacement = DisplacementPath(options.output, i);
-  const std::string staged = files.Stage(options.output);
-  session.ShowAs(staged, options.output);
-  WritePoses(staged, poses);
+  WritePoses(session.Stage(files, options.output), poses);
   if (folder)
     folder->Commit(files);
   else

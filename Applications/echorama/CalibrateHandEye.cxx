@@ -205,14 +205,9 @@ void CalibrateHandEyeFromVolumes(Session& session, HandEyeOptions options)
     session.Note("more than half of the scans could not be used: check the calibration before using it");
   }
   FileReplacement files; // both, or none
-  const auto stage = [&](const std::string& path) {
-    const std::string staged = files.Stage(path);
-    session.ShowAs(staged, path);
-    return staged;
-  };
   if (!options.savePoses.empty())
-    WritePoses(stage(options.savePoses), poses);
-  WriteTransforms(stage(options.output), {calibration, world}, JsonPlace::Print(report));
+    WritePoses(session.Stage(files, options.savePoses), poses);
+  WriteTransforms(session.Stage(files, options.output), {calibration, world}, JsonPlace::Print(report));
   files.Commit();
   session.Say("wrote " + options.output);
 }

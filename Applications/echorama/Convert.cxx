@@ -117,11 +117,8 @@ void ConvertPoses(Session& session, const ConvertOptions& options)
     names.push_back(name.string());
   }
   FileReplacement files; // all of them, or none
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    const std::string staged = files.Stage(names[i]);
-    session.ShowAs(staged, names[i]);
-    WriteItkTransform(staged, poses[i].volumeToWorld);
-  }
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    WriteItkTransform(session.Stage(files, names[i]), poses[i].volumeToWorld);
   files.Commit();
   session.result["files"] = names;
   session.result["lost"] = nlohmann::ordered_json::array();

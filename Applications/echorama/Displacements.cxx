@@ -96,8 +96,7 @@ void DeformVolumes(Session& session, vtkUltrasoundDeformableAligner* aligner, co
                                 {"bending_mm", found.bendingEnergy}};
     if (found.isApplied) {
       const std::string place = DisplacementPath(output, number);
-      poses[number].displacement = files.Stage(place);
-      session.ShowAs(poses[number].displacement, place);
+      poses[number].displacement = session.Stage(files, place);
       WriteDisplacement(
           vtkImageData::SafeDownCast(vtkMultiBlockDataSet::SafeDownCast(aligner->GetOutputDataObject(1))->GetBlock(block)),
           poses[number].displacement);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 #include "Core/Base/Error.h"
+#include "Core/Base/FileReplacement.h"
 #include "Core/Base/Progress.h"
 #include "ProgramExport.h"
 #include <chrono>
@@ -45,6 +46,14 @@ public:
 
   /// From now on messages say \a shown where they would say \a path.
   void ShowAs(const std::string& path, const std::string& shown) { shownAs_.emplace_back(path, shown); }
+
+  /// Where to write \a path for now, one of \a files; messages go on calling it \a path.
+  std::string Stage(FileReplacement& files, const std::string& path)
+  {
+    const std::string staged = files.Stage(path);
+    ShowAs(staged, path);
+    return staged;
+  }
 
   /// Updates \a algorithm under a progress bar. \a stage is the verb for the bar and the key of its time in "stages"; \a what
   /// names the file or thing. Throws Error with what the pipeline reported, Error(Cancelled) when the user stopped it.

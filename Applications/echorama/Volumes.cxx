@@ -130,9 +130,7 @@ void RehearsePoses(Session& session, const std::vector<LoadedVolume>& volumes, c
   for (const LoadedVolume& volume : volumes)
     poses.push_back({volume.file, volume.geometry, volume.volumeToWorld});
   FileReplacement files; // never put in its place
-  const std::string staged = files.Stage(path);
-  session.ShowAs(staged, path);
-  WritePoses(staged, poses);
+  WritePoses(session.Stage(files, path), poses);
 }
 
 vtkSmartPointer<vtkMultiBlockDataSet> BlocksOf(const std::vector<LoadedVolume>& volumes)

@@ -70,18 +70,18 @@ def groups(e, item, length, patient=False):
               sequence(0x20, 0x930F, e(0x20, 0x9302, "FD", doubles(0, 1, 0, 0, 0, 1))) +
               sequence(0x28, 0x9110, e(0x28, 0x30, "DS", b"0.5\\0.25")))
     if patient:
-        shared += (sequence(0x20, 0x9113, e(0x20, 0x32, "DS", b"1\\2\\3")) +
-                   sequence(0x20, 0x9116, e(0x20, 0x37, "DS", b"1\\0\\0\\0\\1\\0")))
+        shared += sequence(0x20, 0x9116, e(0x20, 0x37, "DS", b"1\\0\\0\\0\\1\\0"))
     own = [sequence(0x20, 0x930E, e(0x20, 0x9301, "FD", doubles(k // 2, 2, 3))) +
-           sequence(0x20, 0x9310, e(0x20, 0x930D, "FD", doubles(k % 2))) for k in range(4)]
+           sequence(0x20, 0x9310, e(0x20, 0x930D, "FD", doubles(k % 2))) +
+           (sequence(0x20, 0x9113, e(0x20, 0x32, "DS", b"1\\2\\%d" % (k // 2))) if patient else b"") for k in range(4)]
     return (e(0x5200, 0x9229, "SQ", item(shared) + end, length) +
             e(0x5200, 0x9230, "SQ", b"".join(map(item, own)) + end, length))
 
 
 SLICE = lambda e: e(0x20, 0x32, "DS", b"1\\2\\3") + e(0x20, 0x37, "DS", b"1\\0\\0\\0\\1\\0")
 matrix = struct.pack("<16d", 1, 0, 0, 1, 0, 0, -1, 2, 0, 1, 0, 3, 0, 0, 0, 1)
-enhanced = lambda e, item, length: image(e, 4, b"1.2.840.10008.5.1.4.1.1.6.2", e(0x20, 0x9309, "FD", matrix),
-                                         after=groups(e, item, length))
+enhanced = lambda e, item, length, patient=False: image(e, 4, b"1.2.840.10008.5.1.4.1.1.6.2", e(0x20, 0x9309, "FD", matrix),
+                                                        after=groups(e, item, length, patient))
 philips = (explicit(0x18, 0x602C, "FD", struct.pack("<d", 0.1)) + explicit(0x18, 0x602E, "FD", struct.pack("<d", 0.2)) +
            explicit(0x18, 0x1063, "DS", b"40"))
 philips_after = (explicit(0x3001, 0x10, "LO", b"someone") + explicit(0x3001, 0x1001, "UL", struct.pack("<I", 2)) +
@@ -100,6 +100,7 @@ seeds = {
     "enhanced": file(b"1.2.840.10008.1.2.1", enhanced(explicit, item, None)),
     "enhanced_open": file(b"1.2.840.10008.1.2.1", enhanced(explicit, open_item, UNDEFINED)),
     "enhanced_implicit": file(b"1.2.840.10008.1.2", enhanced(implicit, item, None)),
+    "enhanced_patient": file(b"1.2.840.10008.1.2.1", enhanced(explicit, item, None, True)),
     "deflated": file(b"1.2.840.10008.1.2.1.99", packer.compress(enhanced(explicit, item, None)) + packer.flush()),
     "rle": compressed(b"1.2.840.10008.1.2.5", struct.pack("<16I", 1, 64, *[0] * 14) + b"\x0b" + bytes(range(12)) + b"\0"),
     "jpegs": compressed(b"1.2.840.10008.1.2.4.50", *[b"\xff\xd8\xff\xe0" + bytes(12)] * 3),
