@@ -82,8 +82,9 @@ private:
   {
     while (stream_.ignore(std::numeric_limits<std::streamsize>::max(), '<') && !stream_.eof()) {
       std::string text;
-      char quote = 0;
-      for (int c = stream_.get(); c != '>' || quote != 0; c = stream_.get()) {
+      char quote = 0; // what the next > must wait for; an instruction, <? ?>, has none
+      for (int c = stream_.get(); c != '>' || quote != 0 || (text[0] == '?' && (text.size() < 2 || text.back() != '?'));
+           c = stream_.get()) {
         if (c == std::char_traits<char>::eof() || text.size() > LongestElement)
           lines_.Fail("it cannot be read as a VTK image file: an element has no end");
         text.push_back(static_cast<char>(c));
@@ -92,6 +93,8 @@ private:
           text.clear();
           break;
         }
+        if (text[0] == '?')
+          continue;
         if (quote == 0 && (c == '"' || c == '\''))
           quote = static_cast<char>(c);
         else if (c == quote)
@@ -243,7 +246,12 @@ private:
       if (!element.Find("offset"))
         lines_.Fail(element.name + " has no offset of its appended data");
       later_.push_back(static_cast<std::uint64_t>(Number(element, "offset", 0, static_cast<std::int64_t>(bytes_), 0)));
-    } else if (format && *format == "binary") {
+      return;
+    }
+    for (const auto& [key, value] : element.attributes)
+      if (value.find('>') != std::string::npos) // XML allows it
+        lines_.Fail("the " + key + " of a " + element.name + " has a >, behind which VTK would look for the data");
+    if (format && *format == "binary") {
       const std::uint64_t begin = Position();
       stream_.ignore(std::numeric_limits<std::streamsize>::max(), '<');
       const std::uint64_t end = stream_.eof() ? bytes_ : Position() - 1;
@@ -258,8 +266,7 @@ private:
     appended_ = true;
     Need(element, "encoding", {"raw", "base64"}, true);
     const std::string* encoding = element.Find("encoding");
-    stream_.ignore(std::numeric_limits<std::streamsize>::max(), '_');
-    if (stream_.eof() || !stream_)
+    if (char mark = 0; !(stream_ >> mark) || mark != '_') // behind blanks; VTK takes whatever is there for it
       lines_.Fail("it cannot be read as a VTK image file: its appended data have no beginning");
     const std::uint64_t begin = Position();
     for (const std::uint64_t offset : later_)

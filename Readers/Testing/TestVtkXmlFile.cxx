@@ -18,7 +18,7 @@ protected:
         "<VTKFile type='ImageData' version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt32\">\n"
         "<ImageData WholeExtent=\"2 3 0 1 0 0\" Origin=\"0 0 0\" Spacing=\"1 1 1\" Direction=\"1 0 0 0 1 0 0 0 1\">\n"
         "<Piece Extent=\"2 3 0 1 0 0\"><PointData>\n"
-        "<DataArray type=\"UInt8\" Name=\"a > b\" format=\"binary\" offset=\"0\">BAAAAAECAwQ=</DataArray>\n" // 4 bytes: 1 2 3 4
+        "<DataArray type=\"UInt8\" Name=\"a 'b'\" format=\"binary\" offset=\"0\">BAAAAAECAwQ=</DataArray>\n" // 4 bytes: 1 2 3 4
         "</PointData></Piece></ImageData>\n</VTKFile>\n";
     if (!from.empty()) {
       const std::size_t at = text.find(from);
@@ -62,6 +62,7 @@ TEST_F(VtkXmlFile, ElementsThatVtkWouldNotSurviveAreRefused)
 {
   Refused("UInt8", "Floatnan", "type \"Floatnan\"");
   Refused("type=\"UInt8\" ", "", "no type");
+  Refused("a 'b'", "a > b", "the Name of a DataArray has a >");
   Refused("binary", "binarx", "binarx");
   Refused("LittleEndian", "MiddleEndian", "MiddleEndian");
   Refused("UInt32", "UInt31", "UInt31");
@@ -78,8 +79,10 @@ TEST_F(VtkXmlFile, ElementsThatVtkWouldNotSurviveAreRefused)
   Refused("<ImageData", "<ImageDatum", "lies in no image");
   Refused("<VTKFile", "<!DOCTYPE x><VTKFile", "declaration");
   Refused(" -->", "", "comment has no end");
-  Refused("Name=\"a > b\"", "Name=\"a > b", "has no end");
+  Refused("Name=\"a 'b'\"", "Name=\"a 'b'", "has no end");
   Refused("Name", "type=\"UInt8\" Name", "twice");
+  Refused("<Piece", "<?a \"?><DataArray type=\"x\"/><?b \"?><Piece", "\"x\"");       // not within quotes
+  Refused("<Piece", "<?a ><!-- ?><DataArray type=\"x\"/><?b --> ?><Piece", "\"x\""); // nor in a comment
 }
 
 TEST_F(VtkXmlFile, LengthsInFrontOfDataAreChecked)
@@ -113,4 +116,5 @@ TEST_F(VtkXmlFile, AppendedDataAreCheckedWhereTheyLie)
   refused(appended("BAAAAAECAwQ=", "base64"));
   refused(appended(good, "raw", "400"));
   refused(appended(good, "raw", "-1"));
+  refused(appended(good, "raw\">x")); // _ is not the first
 }
