@@ -84,7 +84,7 @@ class Reader : public WindowUnderTest {
 public:
   Reader()
   {
-    Window().resize(IsLarge() ? QSize(2560, 1440) : QSize(1280, 800));
+    Window().resize(IsLarge() ? QSize(1920, 1200) : QSize(1280, 800));
     Window().Start({}, {}); // with backups
     Settle();
   }

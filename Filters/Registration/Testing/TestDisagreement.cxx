@@ -3,6 +3,7 @@
 #include "Core/Base/Error.h"
 #include "Filters/Registration/Disagreement.h"
 #include "LocalAlignScene.h"
+#include "Testing/Sanitized.h"
 
 using namespace echorama;
 using namespace echorama::testing_scene;
@@ -203,6 +204,7 @@ TEST(Disagreement, WhereThereIsNothingToSeeNothingIsTold)
 // Two bodies that have nothing to do with each other agree nowhere, whatever the size of what they show.
 TEST(Disagreement, DifferentTissuesDoNotAgreeByChance)
 {
+  ECHORAMA_SKIP_SANITIZED();
   const DisagreementMap fine =
       MapOf(Look(Cube(64, 0.9, {0, 0, 0}), Tissue(21), 1, 5.0), Look(Cube(64, 0.9, {0, 0, 0}), Tissue(22), 2, 5.0));
   const DisagreementMap coarse =

@@ -4,6 +4,7 @@
 #include "Core/Base/Angles.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/Random.h"
+#include "Testing/Sanitized.h"
 #include "Tracking/Optical/MarkerPattern.h"
 #include "Tracking/Optical/ShellMarker.h"
 #include <algorithm>
@@ -143,6 +144,7 @@ TEST(ShellMarker, IsReadByACameraThatIsTurnedAndNotInItsPlace)
 
 TEST(ShellMarker, IsNotTakenForAnotherByACameraThatIsTiltedMore)
 {
+  ECHORAMA_SKIP_SANITIZED();
   int read = 0;
   for (const double tilt : {-15.0, -6.0, -2.5, 4.0, 8.0})
     for (const double azimuth : {6.0, 60.0}) { // higher or lower, and leaning
@@ -162,6 +164,7 @@ TEST(ShellMarker, IsNotTakenForAnotherByACameraThatIsTiltedMore)
 
 TEST(ShellMarker, IsReadInLittleLightThroughBlurAndNoise)
 {
+  ECHORAMA_SKIP_SANITIZED();
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     MarkedShell shell;
     shell.light = 12.0;
