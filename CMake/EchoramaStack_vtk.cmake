@@ -1,7 +1,7 @@
 # The VTK stack (9.1 or later): kernels, modules, Python package, programs, installation.
 set(ECHORAMA_VTK_COMPONENTS # what our modules use; find_package(Echorama) asks for the same
   CommonCore CommonDataModel CommonExecutionModel CommonTransforms CommonMath CommonSystem CommonColor CommonMisc
-  FiltersCore FiltersGeneral FiltersSources IOCore IOGeometry IOImage IOPLY IOXML IOLegacy ImagingCore ImagingGeneral ImagingMath ParallelCore
+  FiltersCore FiltersGeneral FiltersSources IOCore IOGeometry IOImage IOXML IOLegacy ImagingCore ImagingGeneral ImagingMath ParallelCore
   InteractionStyle InteractionWidgets RenderingAnnotation RenderingCore RenderingFreeType RenderingOpenGL2
   RenderingVolume RenderingVolumeOpenGL2 RenderingImage)
 find_package(VTK 9.1 REQUIRED COMPONENTS ${ECHORAMA_VTK_COMPONENTS} FiltersHybrid ImagingFourier ImagingHybrid # the last three: peers in benchmarks

@@ -3,15 +3,16 @@
 
 #include "Core/Base/Error.h"
 #include "Core/Base/VtkMessage.h"
+#include "MeshFile.h"
 #include "vtkCallbackCommand.h"
+#include "vtkCellArray.h"
 #include "vtkCommand.h"
 #include "vtkCompositeDataIterator.h"
 #include "vtkCompositeDataSet.h"
 #include "vtkExecutive.h"
 #include "vtkGLTFReader.h"
 #include "vtkNew.h"
-#include "vtkOBJReader.h"
-#include "vtkPLYReader.h"
+#include "vtkPoints.h"
 #include "vtkPolyData.h"
 #include "vtkSmartPointer.h"
 #include "vtkSTLReader.h"
@@ -53,6 +54,26 @@ vtkSmartPointer<vtkDataObject> Read(const std::string& path)
   return reader->GetOutputDataObject(0);
 }
 
+vtkSmartPointer<vtkDataObject> PolyDataOf(const echorama::PolygonMesh& mesh)
+{
+  vtkNew<vtkPoints> points;
+  for (const Eigen::Vector3f& point : mesh.points) {
+    points->InsertNextPoint(point.data());
+  }
+  vtkNew<vtkCellArray> polygons;
+  std::size_t corner = 0;
+  for (const std::size_t end : mesh.ends) {
+    polygons->InsertNextCell(static_cast<int>(end - corner));
+    for (; corner < end; ++corner) {
+      polygons->InsertCellPoint(static_cast<vtkIdType>(mesh.corners[corner]));
+    }
+  }
+  auto data = vtkSmartPointer<vtkPolyData>::New();
+  data->SetPoints(points);
+  data->SetPolys(polygons);
+  return data;
+}
+
 } // namespace
 
 //----------------------------------------------------------------------------
@@ -67,11 +88,11 @@ echorama::TriangleSurface echorama::ReadMesh(const std::string& path)
   if (extension == ".glb" || extension == ".gltf") {
     data = Read<vtkGLTFReader>(path);
   } else if (extension == ".ply") {
-    data = Read<vtkPLYReader>(path);
+    data = PolyDataOf(ReadPly(path));
   } else if (extension == ".stl") {
     data = Read<vtkSTLReader>(path);
   } else if (extension == ".obj") {
-    data = Read<vtkOBJReader>(path);
+    data = PolyDataOf(ReadObj(path));
   } else if (extension == ".vtp") {
     data = Read<vtkXMLPolyDataReader>(path);
   } else {

@@ -10,8 +10,12 @@ import unittest
 import numpy as np
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkCommand
-from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
+from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet, vtkMultiBlockDataSet
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
+from vtkmodules.vtkFiltersSources import vtkSphereSource
+from vtkmodules.vtkIOGeometry import vtkGLTFWriter, vtkOBJWriter, vtkSTLWriter
+from vtkmodules.vtkIOPLY import vtkPLYWriter
+from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 
 import echorama
 
@@ -136,6 +140,35 @@ class Scenes(unittest.TestCase):
             made.Update()
             self.assertTrue((voxels(made.GetOutputDataObject(0).GetBlock(0)) != before).any())
             self.assertIn("displacement", names(made.GetOutputDataObject(3).GetBlock(0)))
+
+    def test_meshes_of_all_formats_are_the_same_tissue(self):
+        def seen(tissue):
+            made = source(Scene=json.dumps({**SCENE, "tissue": tissue}), View=1)
+            made.Update()
+            return voxels(made.GetOutputDataObject(0).GetBlock(0)).copy()
+
+        sphere, scene = vtkSphereSource(), vtkMultiBlockDataSet()
+        sphere.SetCenter(0, 0, 30)
+        sphere.SetRadius(10)
+        sphere.Update()
+        scene.SetBlock(0, vtkMultiBlockDataSet())
+        scene.GetBlock(0).SetBlock(0, sphere.GetOutput())
+        text, big, inline = vtkPLYWriter(), vtkPLYWriter(), vtkGLTFWriter()
+        text.SetFileTypeToASCII()
+        big.SetDataByteOrderToBigEndian()
+        inline.SetInlineData(True)
+        with tempfile.TemporaryDirectory() as folder:
+            tissues = {}
+            for name, writer in (("a.stl", vtkSTLWriter()), ("b.ply", vtkPLYWriter()), ("text.ply", text), ("big.ply", big),
+                                 ("o.obj", vtkOBJWriter()), ("p.vtp", vtkXMLPolyDataWriter()), ("g.gltf", inline)):
+                path = str(pathlib.Path(folder) / name)
+                writer.SetFileName(path)
+                writer.SetInputData(scene if name == "g.gltf" else sphere.GetOutput())
+                writer.Write()
+                tissues[name] = seen([SCENE["tissue"][0], {"mesh": {"file": path, "material": "cyst"}}])
+            self.assertGreater((tissues["a.stl"] != seen(SCENE["tissue"][:1])).mean(), 0.02)
+            for name, tissue in tissues.items():
+                self.assertLess((tissue != tissues["a.stl"]).mean(), 1e-3, name)
 
     def test_what_is_refused(self):
         for properties, words in (

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Any bytes as a PLY file, or, where they do not begin as one, as an OBJ file. No corner of what is accepted lies beyond the
+// points.
+#include "Filters/Scenes/MeshFile.h"
+#include "Testing/Fuzzing.h"
+#include <string_view>
+
+using namespace echorama;
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size)
+{
+  const MemoryFile file(data, size);
+  return Survives([&] {
+    const bool isPly = std::string_view(reinterpret_cast<const char*>(data), size).substr(0, 3) == "ply";
+    const PolygonMesh mesh = isPly ? ReadPly(file.Path()) : ReadObj(file.Path());
+    std::size_t begin = 0;
+    for (const std::size_t end : mesh.ends) {
+      if (end < begin + 3 || end > mesh.corners.size())
+        std::abort(); // a finding
+      begin = end;
+    }
+    for (const std::uint32_t corner : mesh.corners)
+      if (corner >= mesh.points.size())
+        std::abort();
+  });
+}

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+#include <cstdint>
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+namespace echorama {
+
+/// The polygons of a mesh file, as they stand there.
+struct PolygonMesh {
+  std::vector<Eigen::Vector3f> points;
+  std::vector<std::uint32_t> corners; ///< places in points, of one polygon after the other
+  std::vector<std::size_t> ends;      ///< of each polygon, in corners; each has three corners and more
+};
+
+///@{
+/// Decoders for two formats whose readers in VTK do not survive damaged files.
+/// \throws Error(FileSystem) when the file cannot be read, Error(BadFile) when it is damaged or has more than 2 GiB.
+
+/// PLY 1.0, as text and binary: x, y and z of the element vertex, and vertex_indices (or vertex_index) of the element face. Other
+/// elements and properties are passed over.
+PolygonMesh ReadPly(const std::string& path);
+
+/// Wavefront OBJ: v and f. Faces that differ in normals or texture alone share their points; other statements are passed over.
+PolygonMesh ReadObj(const std::string& path);
+///@}
+
+} // namespace echorama
