@@ -20,19 +20,9 @@ namespace {
 
 constexpr std::size_t LargestFile = std::size_t{2} << 30;
 
-// Without a look at more than the size of what is too large.
-std::string ContentOf(const std::string& path)
-{
-  std::error_code unknown; // then reading says why
-  const std::uintmax_t size = std::filesystem::file_size(path, unknown);
-  if (!unknown && size > LargestFile)
-    FailFile(path, "it has " + std::to_string(size) + " bytes; a mesh of its format may have 2 GiB");
-  return ReadTextFile(path, LargestFile);
-}
-
 class PlyDecoder {
 public:
-  explicit PlyDecoder(const std::string& path) : path_(path), content_(ContentOf(path)), rest_(content_) {}
+  explicit PlyDecoder(const std::string& path) : path_(path), content_(ReadMeshContent(path)), rest_(content_) {}
 
   PolygonMesh Run()
   {
@@ -225,6 +215,15 @@ private:
 
 } // namespace
 
+std::string ReadMeshContent(const std::string& path)
+{
+  std::error_code unknown; // then reading says why
+  const std::uintmax_t size = std::filesystem::file_size(path, unknown);
+  if (!unknown && size > LargestFile)
+    FailFile(path, "it has " + std::to_string(size) + " bytes; a mesh of its format may have 2 GiB");
+  return ReadTextFile(path, LargestFile);
+}
+
 PolygonMesh ReadPly(const std::string& path)
 {
   return PlyDecoder(path).Run();
@@ -232,7 +231,7 @@ PolygonMesh ReadPly(const std::string& path)
 
 PolygonMesh ReadObj(const std::string& path)
 {
-  std::string content = ContentOf(path);
+  std::string content = ReadMeshContent(path);
   for (std::size_t at = content.find('\\'); at != std::string::npos; at = content.find('\\', at + 1))
     if (const std::size_t end = content.find_first_not_of(" \t\r", at + 1); end < content.size() && content[end] == '\n')
       std::fill(content.begin() + static_cast<std::ptrdiff_t>(at), content.begin() + static_cast<std::ptrdiff_t>(end) + 1, ' ');

@@ -15,7 +15,7 @@ struct PolygonMesh {
 };
 
 ///@{
-/// Decoders for two formats whose readers in VTK do not survive damaged files.
+/// Decoders for formats whose readers in VTK do not survive damaged files.
 /// \throws Error(FileSystem) when the file cannot be read, Error(BadFile) when it is damaged or has more than 2 GiB.
 
 /// PLY 1.0, as text and binary: x, y and z of the element vertex, and vertex_indices (or vertex_index) of the element face. Other
@@ -24,6 +24,13 @@ PolygonMesh ReadPly(const std::string& path);
 
 /// Wavefront OBJ: v and f. Faces that differ in normals or texture alone share their points; other statements are passed over.
 PolygonMesh ReadObj(const std::string& path);
+
+/// glTF 2.0, as text or binary (.glb): the triangles of the default scene, where its nodes place them. Sparse accessors and what
+/// extensions must say, such as compressed meshes, are refused.
+PolygonMesh ReadGltf(const std::string& path);
+
+/// All of a file, as these read it: the size is looked at first.
+std::string ReadMeshContent(const std::string& path);
 ///@}
 
 } // namespace echorama

@@ -7,10 +7,7 @@
 #include "vtkCallbackCommand.h"
 #include "vtkCellArray.h"
 #include "vtkCommand.h"
-#include "vtkCompositeDataIterator.h"
-#include "vtkCompositeDataSet.h"
 #include "vtkExecutive.h"
-#include "vtkGLTFReader.h"
 #include "vtkNew.h"
 #include "vtkPoints.h"
 #include "vtkPolyData.h"
@@ -30,7 +27,7 @@ namespace {
 
 // What a reader complains of becomes the reason of an error.
 template <class Reader>
-vtkSmartPointer<vtkDataObject> Read(const std::string& path)
+vtkSmartPointer<vtkPolyData> Read(const std::string& path)
 {
   std::vector<std::string> complaints;
   vtkNew<vtkCallbackCommand> listener;
@@ -51,10 +48,10 @@ vtkSmartPointer<vtkDataObject> Read(const std::string& path)
   if (!problem.empty()) {
     throw Error(Error::Kind::BadFile, path + ": " + problem);
   }
-  return reader->GetOutputDataObject(0);
+  return reader->GetOutput();
 }
 
-vtkSmartPointer<vtkDataObject> PolyDataOf(const echorama::PolygonMesh& mesh)
+vtkSmartPointer<vtkPolyData> PolyDataOf(const echorama::PolygonMesh& mesh)
 {
   vtkNew<vtkPoints> points;
   for (const Eigen::Vector3f& point : mesh.points) {
@@ -79,14 +76,15 @@ vtkSmartPointer<vtkDataObject> PolyDataOf(const echorama::PolygonMesh& mesh)
 //----------------------------------------------------------------------------
 echorama::TriangleSurface echorama::ReadMesh(const std::string& path)
 {
-  if (!std::filesystem::is_regular_file(path)) {
+  std::error_code unknown; // of a name that no file can have
+  if (!std::filesystem::is_regular_file(path, unknown)) {
     throw Error(Error::Kind::FileSystem, path + ": there is no such file");
   }
   std::string extension = std::filesystem::path(path).extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
-  vtkSmartPointer<vtkDataObject> data;
+  vtkSmartPointer<vtkPolyData> data;
   if (extension == ".glb" || extension == ".gltf") {
-    data = Read<vtkGLTFReader>(path);
+    data = PolyDataOf(ReadGltf(path));
   } else if (extension == ".ply") {
     data = PolyDataOf(ReadPly(path));
   } else if (extension == ".stl") {
@@ -100,16 +98,7 @@ echorama::TriangleSurface echorama::ReadMesh(const std::string& path)
   }
 
   echorama::TriangleSurface surface;
-  if (auto* parts = vtkCompositeDataSet::SafeDownCast(data)) {
-    const auto leaf = vtk::TakeSmartPointer(parts->NewIterator());
-    for (leaf->InitTraversal(); !leaf->IsDoneWithTraversal(); leaf->GoToNextItem()) {
-      if (auto* part = vtkPolyData::SafeDownCast(leaf->GetCurrentDataObject())) {
-        echorama::AddTriangles(surface, part);
-      }
-    }
-  } else if (auto* part = vtkPolyData::SafeDownCast(data)) {
-    echorama::AddTriangles(surface, part);
-  }
+  echorama::AddTriangles(surface, data);
   if (surface.triangles.empty()) {
     throw Error(Error::Kind::BadFile, path + ": there are no triangles in it");
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Any bytes as a PLY file, or, where they do not begin as one, as an OBJ file. No corner of what is accepted lies beyond the
-// points.
+// Any bytes as a PLY or a glTF file, or, where they begin as neither, as an OBJ file. No corner of what is accepted lies beyond
+// the points.
 #include "Filters/Scenes/MeshFile.h"
 #include "Testing/Fuzzing.h"
 #include <string_view>
@@ -11,8 +11,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 {
   const MemoryFile file(data, size);
   return Survives([&] {
-    const bool isPly = std::string_view(reinterpret_cast<const char*>(data), size).substr(0, 3) == "ply";
-    const PolygonMesh mesh = isPly ? ReadPly(file.Path()) : ReadObj(file.Path());
+    const std::string_view content(reinterpret_cast<const char*>(data), size);
+    const bool isPly = content.substr(0, 3) == "ply", isGltf = content.substr(0, 4) == "glTF" || content.substr(0, 1) == "{";
+    const PolygonMesh mesh = isPly ? ReadPly(file.Path()) : isGltf ? ReadGltf(file.Path()) : ReadObj(file.Path());
     std::size_t begin = 0;
     for (const std::size_t end : mesh.ends) {
       if (end < begin + 3 || end > mesh.corners.size())

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""SeedsMesh.py DIR: small PLY and OBJ files for the fuzzer to start from."""
+"""SeedsMesh.py DIR: small PLY, OBJ and glTF files for the fuzzer to start from."""
+import base64
 import struct
 import sys
 from pathlib import Path
@@ -25,5 +26,32 @@ seeds = {
     "triangle.obj": b"# a\no a\nv 0 0 0\nv 1 0 0 1.0\nv 0 1 0\nvn 0 0 1\nvt 0 0\nf 1/1/1 2//1 3\n",
     "backwards.obj": b"v 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nv 0 0 1\r\nf -1 -2 \\\r\n -3 -4\r\ns off\r\n",
 }
+DATA = struct.pack("<9f3B3H3I", *points, 0, 1, 2, 0, 1, 2, 0, 1, 2)
+
+
+def gltf(node='{"mesh": 0}', indices=1, mode=4, view="", uri=""):
+    return f"""{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0]}}], "nodes": [{node}],
+"meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}, "indices": {indices}, "mode": {mode}}}]}}],
+"accessors": [{{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}},
+{{"bufferView": 1, "componentType": 5121, "count": 3, "type": "SCALAR"}},
+{{"bufferView": 1, "byteOffset": 3, "componentType": 5123, "count": 3, "type": "SCALAR"}},
+{{"bufferView": 1, "byteOffset": 9, "componentType": 5125, "count": 3, "type": "SCALAR"}}],
+"bufferViews": [{{"buffer": 0, "byteLength": 36{view}}}, {{"buffer": 0, "byteOffset": 36, "byteLength": 21}}],
+"buffers": [{{"byteLength": 57{uri}}}]}}"""
+
+
+def glb(text):
+    text += " " * (-len(text) % 4)
+    return struct.pack("<4sIIII", b"glTF", 2, 28 + len(text) + len(DATA), len(text), 0x4E4F534A) + text.encode() + \
+        struct.pack("<II", len(DATA), 0x4E4942) + DATA
+
+
+TURNED = '{"children": [1], "translation": [1, 2, 3], "rotation": [0, 0, 1, 1], "scale": [1, 2, -3]}, {"mesh": 0}'
+MOVED = '{"mesh": 0, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 4, 5, 6, 1]}'
+seeds.update({
+    "bytes.glb": glb(gltf()), "turned.glb": glb(gltf(TURNED, 2, 5, ', "byteStride": 12')), "moved.glb": glb(gltf(MOVED, 3, 6)),
+    "inline.gltf": gltf(uri=f', "uri": "data:application/octet-stream;base64,{base64.b64encode(DATA).decode()}"').encode(),
+    "beside.gltf": gltf(uri=', "uri": "no%20such.bin"').encode(),
+})
 for name, content in seeds.items():
     (folder / name).write_bytes(content)

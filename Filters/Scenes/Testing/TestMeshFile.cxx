@@ -150,9 +150,175 @@ TEST_F(MeshFile, ObjThatIsDamagedIsRefusedWithItsLine)
   ObjRefused("v 0 0 x\n", "line 1: a vertex");
 }
 
+namespace {
+
+class GltfFile : public TemporaryFolder {
+protected:
+  static std::string Bytes(std::uint32_t word)
+  {
+    std::string bytes;
+    for (int i = 0; i < 4; ++i)
+      bytes.push_back(static_cast<char>(word >> 8 * i & 0xFF));
+    return bytes;
+  }
+  static std::string Glb(const std::string& json, const std::string& data)
+  {
+    const std::string chunks = Bytes(static_cast<std::uint32_t>(json.size())) + "JSON" + json +
+                               Bytes(static_cast<std::uint32_t>(data.size())) + std::string("BIN\0", 4) + data;
+    return "glTF" + Bytes(2) + Bytes(static_cast<std::uint32_t>(12 + chunks.size())) + chunks;
+  }
+  // Four points of 16 bytes each, and behind them the numbers 0 to 3, of one, two and four bytes.
+  static std::string Data()
+  {
+    std::string data;
+    for (const auto& point : points) {
+      for (const float coordinate : point) {
+        std::uint32_t bits;
+        std::memcpy(&bits, &coordinate, 4);
+        data += Bytes(bits);
+      }
+      data += "skip";
+    }
+    data += std::string("\0\1\2\3", 4) + std::string("\0\0\1\0\2\0\3\0", 8);
+    for (std::uint32_t i = 0; i < 4; ++i)
+      data += Bytes(i);
+    return data;
+  }
+  // One node that shows one primitive, with \a from replaced.
+  static std::string Json(const std::string& from = "", const std::string& to = "")
+  {
+    std::string text = R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+      "nodes": [{"mesh": 0}],
+      "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 2, "mode": 4}]}],
+      "accessors": [{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+                    {"bufferView": 1, "componentType": 5121, "count": 4, "type": "SCALAR"},
+                    {"bufferView": 1, "byteOffset": 4, "componentType": 5123, "count": 4, "type": "SCALAR"},
+                    {"bufferView": 1, "byteOffset": 12, "componentType": 5125, "count": 4, "type": "SCALAR"}],
+      "bufferViews": [{"buffer": 0, "byteLength": 64, "byteStride": 16}, {"buffer": 0, "byteOffset": 64, "byteLength": 28}],
+      "buffers": [{"byteLength": 92}]})";
+    if (!from.empty()) {
+      const std::size_t at = text.find(from);
+      EXPECT_NE(at, std::string::npos) << from;
+      text.replace(at, from.size(), to);
+    }
+    return text;
+  }
+  PolygonMesh Read(const std::string& from = "", const std::string& to = "") const
+  {
+    return ReadGltf(Put("a.glb", Glb(Json(from, to), Data())));
+  }
+  void Refused(const std::string& from, const std::string& to, const std::string& words) const
+  {
+    const std::string path = Put("a.glb", Glb(Json(from, to), Data()));
+    ExpectRefused([&] { ReadGltf(path); }, Error::Kind::BadFile, path, words);
+  }
+
+  using Corners = std::vector<std::uint32_t>;
+  static inline const std::vector<Eigen::Vector3f> points{{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {0, 0, 3}};
+};
+
+} // namespace
+
+TEST_F(GltfFile, TrianglesStripsAndFansOfAllIndices)
+{
+  EXPECT_EQ(Read().points, points);
+  for (const char* accessor : {"\"indices\": 1", "\"indices\": 2", "\"indices\": 3", "\"extras\": {}"})
+    EXPECT_EQ(Read("\"indices\": 2", accessor).corners, (Corners{0, 1, 2})) << accessor; // a fourth corner is none of a triangle
+  EXPECT_EQ(Read("\"mode\": 4", "\"mode\": 5").corners, (Corners{0, 1, 2, 1, 3, 2}));
+  EXPECT_EQ(Read("\"mode\": 4", "\"mode\": 6").corners, (Corners{0, 1, 2, 0, 2, 3}));
+  EXPECT_TRUE(Read("\"mode\": 4", "\"mode\": 1").points.empty()) << "lines are no surface";
+  EXPECT_EQ(Read(", \"mode\": 4", "").ends, (std::vector<std::size_t>{3}));
+}
+
+TEST_F(GltfFile, NodesPlaceAndMirrorTheirMeshes)
+{
+  // A quarter turn about z of twice the size, beside a mirrored one below a node without a mesh, which is moved.
+  const PolygonMesh mesh = Read(R"([{"mesh": 0}])", R"([
+    {"mesh": 0, "translation": [10, 0, 0], "rotation": [0, 0, 0.70710678118654757, 0.70710678118654757], "scale": [2, 2, 2], "children": [1]},
+    {"matrix": [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,5,1], "children": [2]}, {"mesh": 0, "scale": [1, 1, -1]}])");
+  ASSERT_EQ(mesh.points.size(), 8u);
+  EXPECT_LT((mesh.points[1] - Eigen::Vector3f(10, 2, 0)).norm(), 1e-5);
+  EXPECT_LT((mesh.points[2] - Eigen::Vector3f(6, 0, 0)).norm(), 1e-5);
+  EXPECT_LT((mesh.points[7] - Eigen::Vector3f(10, 0, 4)).norm(), 1e-5); // (0, 0, 2 * (5 - 3))
+  EXPECT_EQ(mesh.corners, (Corners{0, 1, 2, 4, 6, 5}));
+}
+
+TEST_F(GltfFile, DataMayLieInTheFileAsTextOrBesideIt)
+{
+  std::ofstream(Path("a b.bin"), std::ios::binary) << Data();
+  EXPECT_EQ(ReadGltf(Put("a.gltf", Json("\"byteLength\": 92", "\"uri\": \"a%20b.bin\""))).points, points);
+  const std::string ten = "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA"; // 24 bytes of 0
+  EXPECT_EQ(ReadGltf(Put("a.gltf", Json("\"byteLength\": 92",
+                                        "\"uri\": \"" + ten +
+                                            "AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA"
+                                            "AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA\"")))
+                .corners,
+            (Corners{0, 0, 0}));
+  const std::string path = Put("a.gltf", Json("\"byteLength\": 92", "\"uri\": \"none.bin\""));
+  ExpectRefused([&] { ReadGltf(path); }, Error::Kind::FileSystem, Path("none.bin"), "cannot be read");
+}
+
+TEST_F(GltfFile, WhatIsDamagedIsRefusedWithTheReason)
+{
+  Refused("\"scenes\"", "\"scene_\"", "no scene");
+  Refused("\"scene\": 0", "\"scene\": 1", "scenes 1");
+  Refused("\"nodes\": [0]", "\"nodes\": [1]", "nodes 1");
+  Refused("\"nodes\": [0]", "\"nodes\": [0, 0]", "hangs on two others");
+  Refused("{\"mesh\": 0}", "{\"mesh\": 0, \"children\": [0]}", "hangs on two others");
+  Refused("{\"mesh\": 0}", "{\"mesh\": -1}", "no count");
+  Refused("{\"mesh\": 0}", "{\"mesh\": 0, \"rotation\": [0, 0, 0, 0]}", "rotation");
+  Refused("{\"mesh\": 0}", "{\"mesh\": 0, \"matrix\": [1]}", "16 numbers");
+  Refused("{\"mesh\": 0}", "3", "no object");
+  Refused("\"POSITION\"", "\"NORMAL\"", "POSITION");
+  Refused("\"POSITION\": 0", "\"POSITION\": 1", "no VEC3");
+  Refused("\"POSITION\": 0", "\"POSITION\": \"0\"", "number");
+  Refused("5126", "5122", "no floats");
+  Refused("5123", "5122", "no whole numbers");
+  Refused("\"count\": 4", "\"count\": 5", "beyond its buffer");
+  Refused("\"count\": 4", "\"count\": 3", "names point 3");
+  Refused("\"count\": 4", "\"count\": 1e15", "beyond its buffer");
+  Refused("\"count\": 4", "\"sparse\": {}, \"count\": 4", "sparse");
+  Refused("\"byteOffset\": 4", "\"byteOffset\": 21", "beyond its buffer");
+  Refused("\"byteOffset\": 64", "\"byteOffset\": 65", "beyond its buffer");
+  Refused("\"byteStride\": 16", "\"byteStride\": 8", "byteStride");
+  Refused("\"byteStride\": 16", "\"byteStride\": 253", "byteStride");
+  Refused("\"buffer\": 0", "\"buffer\": 1", "buffers 1");
+  Refused("\"byteLength\": 92", "\"uri\": \"https://a/b\"", "no file beside it");
+  Refused("\"asset\"", "\"extensionsRequired\": [\"KHR_draco_mesh_compression\"], \"asset\"", "KHR_draco_mesh_compression");
+}
+
+TEST_F(GltfFile, FewBytesDoNotBecomeManyPoints)
+{
+  const std::string large(std::size_t{12} << 16, '\0');
+  std::string nodes = "{\"mesh\": 0}", shown = "0";
+  for (int i = 1; i < 2000; ++i) {
+    nodes += ", {\"mesh\": 0}";
+    shown += ", " + std::to_string(i);
+  }
+  std::string json = Json("\"nodes\": [0]", "\"nodes\": [" + shown + "]");
+  const auto replace = [&json](const std::string& from, const std::string& to) {
+    json.replace(json.find(from), from.size(), to);
+  };
+  replace("{\"mesh\": 0}", nodes);
+  replace("\"count\": 4", "\"count\": 65536");
+  replace("\"byteLength\": 64, \"byteStride\": 16", "\"byteLength\": 786432");
+  replace(", \"indices\": 2", "");
+  const std::string path = Put("a.glb", Glb(json, large));
+  ExpectRefused([&] { ReadGltf(path); }, Error::Kind::BadFile, path, "far more than its size can hold");
+}
+
+TEST_F(GltfFile, TruncatedAnywhereIsRefused)
+{
+  const std::string whole = Glb(Json(), Data());
+  for (std::size_t size = 0; size < whole.size(); size += 3) {
+    const std::string path = Put("a.glb", whole.substr(0, size));
+    ExpectRefused([&] { ReadGltf(path); }, Error::Kind::BadFile, path, "");
+  }
+}
+
 TEST_F(MeshFile, WhatIsNoFileOrTooLargeIsRefused)
 {
-  for (const auto read : {ReadPly, ReadObj}) {
+  for (const auto read : {ReadPly, ReadObj, ReadGltf}) {
     ExpectRefused([&] { read(Path("none")); }, Error::Kind::FileSystem, Path("none"), "cannot be read");
     ExpectRefused([&] { read(folder.string()); }, Error::Kind::FileSystem, folder.string(), "cannot be read");
     const std::string large = Put("large", "ply");
