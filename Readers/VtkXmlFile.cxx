@@ -23,6 +23,7 @@ namespace {
 
 constexpr std::size_t LongestElement = 1 << 20;
 constexpr std::uint64_t LargestRatio = 10000; // of what compressed data can become
+constexpr std::string_view Base64Digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
 struct XmlElement {
   std::string name; // "/name" at its end
@@ -39,24 +40,25 @@ enum class VtkXmlEncoding { Raw, Base64 };
 
 class VtkXmlCheck {
 public:
-  explicit VtkXmlCheck(const std::string& path)
-    : lines_(path), stream_(path, std::ios::binary), bytes_(std::filesystem::file_size(path))
+  VtkXmlCheck(const std::string& path, const std::string& type)
+    : type_(type), lines_(path), stream_(path, std::ios::binary), bytes_(std::filesystem::file_size(path))
   {
   }
 
   std::vector<std::string> Run()
   {
     std::vector<std::string> notes;
-    bool image = false;
+    bool found = false;
     for (std::optional<XmlElement> element = Next(); element; element = Next()) {
       const std::string& name = element->name;
       if (name == "VTKFile")
         File(*element);
-      else if (name == "ImageData") {
-        if (image)
-          lines_.Fail("it has two ImageData elements");
-        image = true;
-        notes = Geometry(*element);
+      else if (name == type_) {
+        if (found)
+          lines_.Fail("it has two " + type_ + " elements");
+        found = true;
+        if (type_ == "ImageData")
+          notes = Geometry(*element);
       } else if (name == "Piece")
         Piece(*element);
       else if (name == "DataArray" || name == "Array")
@@ -67,8 +69,8 @@ public:
       } else if (name == "/VTKFile")
         break; // what follows is not of it
     }
-    if (!image)
-      lines_.Fail("it is not a VTK image file: it has no ImageData element");
+    if (!found)
+      lines_.Fail("it is no VTK file of this kind: it has no " + type_ + " element");
     if (!later_.empty() && !appended_)
       lines_.Fail("its data are said to be appended, and there are none");
     return notes;
@@ -86,7 +88,7 @@ private:
       for (int c = stream_.get(); c != '>' || quote != 0 || (text[0] == '?' && (text.size() < 2 || text.back() != '?'));
            c = stream_.get()) {
         if (c == std::char_traits<char>::eof() || text.size() > LongestElement)
-          lines_.Fail("it cannot be read as a VTK image file: an element has no end");
+          lines_.Fail("it cannot be read as a VTK file: an element has no end");
         text.push_back(static_cast<char>(c));
         if (text == "!--") {
           SkipComment();
@@ -103,7 +105,7 @@ private:
       if (text.empty() || text[0] == '?')
         continue;
       if (text[0] == '!')
-        lines_.Fail("it cannot be read as a VTK image file: it holds a declaration <" + text.substr(0, 40) + ">");
+        lines_.Fail("it cannot be read as a VTK file: it holds a declaration <" + text.substr(0, 40) + ">");
       return Parsed(text);
     }
     return std::nullopt;
@@ -118,7 +120,7 @@ private:
       before[0] = before[1];
       before[1] = static_cast<char>(c);
     }
-    lines_.Fail("it cannot be read as a VTK image file: a comment has no end");
+    lines_.Fail("it cannot be read as a VTK file: a comment has no end");
   }
 
   // name key="value" key='value' /
@@ -139,7 +141,7 @@ private:
                                     ? std::string_view::npos
                                     : text.find(text[open], open + 1);
       if (close == std::string_view::npos)
-        lines_.Fail("it cannot be read as a VTK image file: the attributes of " + element.name + " are damaged");
+        lines_.Fail("it cannot be read as a VTK file: the attributes of " + element.name + " are damaged");
       const std::string key(TrimBlanks(text.substr(at, equals - at)));
       if (!element.attributes.emplace(key, text.substr(open + 1, close - open - 1)).second)
         lines_.Fail(element.name + " says " + key + " twice");
@@ -184,7 +186,7 @@ private:
 
   void File(const XmlElement& element)
   {
-    Need(element, "type", {"ImageData"}, false);
+    Need(element, "type", {type_.c_str()}, false);
     Need(element, "byte_order", {"LittleEndian", "BigEndian"}, true);
     Need(element, "header_type", {"UInt32", "UInt64"}, true);
     const std::string* order = element.Find("byte_order");
@@ -200,7 +202,7 @@ private:
   {
     const std::string* whole = element.Find("WholeExtent");
     if (!whole)
-      lines_.Fail("it cannot be read as a VTK image file: it has no WholeExtent");
+      lines_.Fail("it cannot be read as a VTK file: it has no WholeExtent");
     whole_ = Extent("WholeExtent", *whole);
     double voxels = 1.0;
     for (std::size_t axis = 0; axis < 3; ++axis)
@@ -222,9 +224,14 @@ private:
 
   void Piece(const XmlElement& element) const
   {
+    if (type_ == "PolyData") {
+      for (const char* count : {"NumberOfPoints", "NumberOfVerts", "NumberOfLines", "NumberOfStrips", "NumberOfPolys"})
+        Number(element, count, 0, static_cast<std::int64_t>(LargestRatio * bytes_), 0);
+      return;
+    }
     const std::string* text = element.Find("Extent");
     if (!text || !whole_)
-      lines_.Fail("it cannot be read as a VTK image file: a piece has no Extent, or lies in no image");
+      lines_.Fail("it cannot be read as a VTK file: a piece has no Extent, or lies in no image");
     const std::array<int, 6> piece = Extent("Extent", *text);
     for (std::size_t axis = 0; axis < 3; ++axis)
       if (piece[2 * axis] < (*whole_)[2 * axis] || piece[2 * axis + 1] > (*whole_)[2 * axis + 1])
@@ -267,7 +274,7 @@ private:
     Need(element, "encoding", {"raw", "base64"}, true);
     const std::string* encoding = element.Find("encoding");
     if (char mark = 0; !(stream_ >> mark) || mark != '_') // behind blanks; VTK takes whatever is there for it
-      lines_.Fail("it cannot be read as a VTK image file: its appended data have no beginning");
+      lines_.Fail("it cannot be read as a VTK file: its appended data have no beginning");
     const std::uint64_t begin = Position();
     for (const std::uint64_t offset : later_)
       Lengths(begin + offset, bytes_, encoding && *encoding == "raw" ? VtkXmlEncoding::Raw : VtkXmlEncoding::Base64);
@@ -314,8 +321,8 @@ private:
         const int c = stream_.get();
         if (c == ' ' || c == '\n' || c == '\r' || c == '\t')
           continue;
-        const int value = Digit(c);
-        if (value < 0)
+        const std::size_t value = Base64Digits.find(static_cast<char>(c));
+        if (value == std::string_view::npos)
           break;
         bits = bits << 6 | static_cast<std::uint32_t>(value);
         held += 6;
@@ -341,17 +348,7 @@ private:
     return words;
   }
 
-  // Of base64; -1 when it is none.
-  static int Digit(int c)
-  {
-    return c >= 'A' && c <= 'Z'   ? c - 'A'
-           : c >= 'a' && c <= 'z' ? c - 'a' + 26
-           : c >= '0' && c <= '9' ? c - '0' + 52
-           : c == '+'             ? 62
-           : c == '/'             ? 63
-                                  : -1;
-  }
-
+  const std::string type_;
   HeaderLines lines_; // says what is wrong
   std::ifstream stream_;
   std::uint64_t bytes_;
@@ -363,9 +360,9 @@ private:
 
 } // namespace
 
-std::vector<std::string> CheckVtkXmlFile(const std::string& path)
+std::vector<std::string> CheckVtkXmlFile(const std::string& path, const std::string& type)
 {
-  return VtkXmlCheck(path).Run();
+  return VtkXmlCheck(path, type).Run();
 }
 
 } // namespace echorama

@@ -4,9 +4,11 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/VtkMessage.h"
 #include "MeshFile.h"
+#include "Readers/VtkXmlFile.h"
 #include "vtkCallbackCommand.h"
 #include "vtkCellArray.h"
 #include "vtkCommand.h"
+#include "vtkDataArray.h"
 #include "vtkExecutive.h"
 #include "vtkNew.h"
 #include "vtkPoints.h"
@@ -51,6 +53,19 @@ vtkSmartPointer<vtkPolyData> Read(const std::string& path)
   return reader->GetOutput();
 }
 
+// What VTK's filters believe of cells.
+void CheckCells(vtkCellArray* cells, vtkIdType points, const std::string& path)
+{
+  double range[2] = {0.0, 0.0};
+  if (cells->GetNumberOfConnectivityIds() > 0) {
+    cells->GetConnectivityArray()->GetRange(range);
+  }
+  if (!cells->IsValid() || range[0] < 0.0 || range[1] >= static_cast<double>(std::max<vtkIdType>(points, 1))) {
+    throw Error(Error::Kind::BadFile,
+                path + ": its polygons are damaged: they name points that are not there, or end before they begin");
+  }
+}
+
 vtkSmartPointer<vtkPolyData> PolyDataOf(const echorama::PolygonMesh& mesh)
 {
   vtkNew<vtkPoints> points;
@@ -92,7 +107,10 @@ echorama::TriangleSurface echorama::ReadMesh(const std::string& path)
   } else if (extension == ".obj") {
     data = PolyDataOf(ReadObj(path));
   } else if (extension == ".vtp") {
+    CheckVtkXmlFile(path, "PolyData");
     data = Read<vtkXMLPolyDataReader>(path);
+    CheckCells(data->GetPolys(), data->GetNumberOfPoints(), path);
+    CheckCells(data->GetStrips(), data->GetNumberOfPoints(), path);
   } else {
     throw Error(Error::Kind::BadFile, path + ": its extension is none of a mesh (.glb, .gltf, .ply, .stl, .obj, .vtp)");
   }

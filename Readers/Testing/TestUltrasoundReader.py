@@ -249,8 +249,8 @@ class Reader(unittest.TestCase):
 
     def test_vtk_image_files_that_are_refused(self):
         good = vti()
-        self.refused("a.vti", good[:150], "VTK image file")
-        self.refused("a.vti", good[:-80], "VTK image file")
+        self.refused("a.vti", good[:150], "VTK file")
+        self.refused("a.vti", good[:-80], "VTK file")
         self.refused("a.vti", vti(values="1 2 3"), "truncated or damaged")
         self.refused("a.vti", vti(extent="0 100000 0 100000 0 100000"), "more voxels than the file can hold")
         self.refused("a.vti", vti(extent="0 2147483647 0 2147483647 0 2147483647"), "overflows")

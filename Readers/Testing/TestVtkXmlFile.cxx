@@ -118,3 +118,20 @@ TEST_F(VtkXmlFile, AppendedDataAreCheckedWhereTheyLie)
   refused(appended(good, "raw", "-1"));
   refused(appended(good, "raw\">x")); // _ is not the first
 }
+
+TEST_F(VtkXmlFile, CountsOfPolygonsAreChecked)
+{
+  const auto file = [&](const std::string& counts) {
+    return Put("a.vtp", "<VTKFile type=\"PolyData\"><PolyData><Piece " + counts + "/></PolyData></VTKFile>");
+  };
+  EXPECT_TRUE(CheckVtkXmlFile(file("NumberOfPoints=\"3\" NumberOfPolys=\"1\""), "PolyData").empty());
+  for (const char* counts :
+       {"NumberOfPoints=\"-3\"", "NumberOfStrips=\"4000000000\"", "NumberOfPolys=\"1.5\"", "NumberOfLines=\"\""}) {
+    const std::string path = file(counts);
+    ExpectRefused([&] { CheckVtkXmlFile(path, "PolyData"); }, Error::Kind::BadFile, path, "NumberOf");
+  }
+  const std::string path = file("");
+  ExpectRefused([&] { CheckVtkXmlFile(path); }, Error::Kind::BadFile, path, "PolyData");
+  const std::string image = File();
+  ExpectRefused([&] { CheckVtkXmlFile(image, "PolyData"); }, Error::Kind::BadFile, image, "ImageData");
+}

@@ -170,6 +170,31 @@ class Scenes(unittest.TestCase):
             for name, tissue in tissues.items():
                 self.assertLess((tissue != tissues["a.stl"]).mean(), 1e-3, name)
 
+    def test_damaged_polydata_is_refused(self):
+        sphere, writer = vtkSphereSource(), vtkXMLPolyDataWriter()
+        writer.SetInputConnection(sphere.GetOutputPort())
+        writer.SetDataModeToAscii()
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "p.vtp"
+            writer.SetFileName(str(path))
+            writer.Write()
+            whole = path.read_text()
+            for count, words in (("-2147483648", "NumberOfPoints"), ("40", "points that are not there")):
+                path.write_text(whole.replace('NumberOfPoints="50"', f'NumberOfPoints="{count}"'))
+                errors = self.errors_of(source(Scene=json.dumps({**SCENE, "tissue": [{"mesh": {"file": str(path), "material": "liver"}}]})))
+                self.assertIn(words, errors[0])
+                self.assertIn("p.vtp", errors[0])
+
+    @staticmethod
+    def errors_of(made):
+        errors = []
+        observe = lambda caller, event, text="": errors.append(text)
+        observe.CallDataType = "string0"
+        for one in (made, made.GetExecutive()):
+            one.AddObserver(vtkCommand.ErrorEvent, observe)
+        made.Update()
+        return errors
+
     def test_what_is_refused(self):
         for properties, words in (
                 ({}, ["there is no scene"]),
@@ -179,12 +204,8 @@ class Scenes(unittest.TestCase):
                 ({"Scene": json.dumps(SCENE), "View": 3}, ["View is 3", "2 views"]),
                 ({"FileName": "/nowhere/scene.json"}, ["/nowhere/scene.json"]),
                 ({"Scene": json.dumps({**SCENE, "tissue": [{"mesh": {"file": "nowhere.stl", "material": "liver"}}]})}, ["nowhere.stl"])):
-            made, errors = source(**properties), []
-            observe = lambda caller, event, text="": errors.append(text)
-            observe.CallDataType = "string0"
-            for one in (made, made.GetExecutive()):
-                one.AddObserver(vtkCommand.ErrorEvent, observe)
-            made.Update()
+            made = source(**properties)
+            errors = self.errors_of(made)
             self.assertTrue(errors, properties)
             for word in words:
                 self.assertIn(word, errors[0])
