@@ -48,9 +48,12 @@ public:
   std::vector<std::string> Run()
   {
     std::vector<std::string> notes;
-    bool found = false;
+    bool found = false, isOpen = false, hasPiece = false;
     for (std::optional<XmlElement> element = Next(); element; element = Next()) {
       const std::string& name = element->name;
+      if ((name == "VTKFile") == isOpen)
+        lines_.Fail("it cannot be read as a VTK file: it does not begin with a VTKFile element, or has two");
+      isOpen = true;
       if (name == "VTKFile")
         File(*element);
       else if (name == type_) {
@@ -59,9 +62,10 @@ public:
         found = true;
         if (type_ == "ImageData")
           notes = Geometry(*element);
-      } else if (name == "Piece")
+      } else if (name == "Piece") {
+        hasPiece = true;
         Piece(*element);
-      else if (name == "DataArray" || name == "Array")
+      } else if (name == "DataArray" || name == "Array" || element->Find("type")) // VTK reads arrays of any name
         Array(*element);
       else if (name == "AppendedData") {
         Appended(*element);
@@ -69,8 +73,8 @@ public:
       } else if (name == "/VTKFile")
         break; // what follows is not of it
     }
-    if (!found)
-      lines_.Fail("it is no VTK file of this kind: it has no " + type_ + " element");
+    if (!found || !hasPiece)
+      lines_.Fail("it is no VTK file of this kind: it has no " + type_ + " element, or no piece of it");
     if (!later_.empty() && !appended_)
       lines_.Fail("its data are said to be appended, and there are none");
     return notes;
@@ -142,7 +146,7 @@ private:
                                     : text.find(text[open], open + 1);
       if (close == std::string_view::npos)
         lines_.Fail("it cannot be read as a VTK file: the attributes of " + element.name + " are damaged");
-      const std::string key(TrimBlanks(text.substr(at, equals - at)));
+      const std::string key(text.substr(at, std::min(equals, text.find_first_of(blanks, at)) - at));
       if (!element.attributes.emplace(key, text.substr(open + 1, close - open - 1)).second)
         lines_.Fail(element.name + " says " + key + " twice");
       at = close + 1;

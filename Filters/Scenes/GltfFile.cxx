@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Format: https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html. Materials, texture, skins and animation are passed over.
+// Format: https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html. Materials, textures, lights and animation are passed over.
 //
 // Places and counts in a file are believed only as far as its buffers go. A mesh may be shown by many nodes, which few bytes ask
 // for: what comes of a file is limited by its size.
@@ -7,6 +7,7 @@
 #include "Core/Base/JsonPlace.h"
 #include "MeshFile.h"
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <cstring>
@@ -18,7 +19,10 @@
 namespace echorama {
 namespace {
 
-constexpr std::size_t LargestRatio = 64; // of points and corners to the bytes of the files
+constexpr std::size_t LargestRatio = 16; // of points and corners to the bytes of the files
+
+// Extensions that change no triangle begin with these.
+constexpr std::array<std::string_view, 4> Harmless{"KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_"};
 
 std::uint32_t Word(const char* bytes)
 {
@@ -76,8 +80,12 @@ public:
     file_ = place_.Parse(JsonOf(content_));
     if (!file_.is_object())
       place_.Fail("it is no glTF file");
-    if (const Json& required = List(file_, "extensionsRequired"); !required.empty())
-      place_.Fail("it needs the extension " + place_.Text(required[0]) + ", which is not read");
+    for (const Json& required : List(file_, "extensionsRequired")) {
+      const std::string name = place_.Text(required);
+      if (std::none_of(Harmless.begin(), Harmless.end(),
+                       [&name](std::string_view begin) { return name.compare(0, begin.size(), begin) == 0; }))
+        place_.Fail("it needs the extension " + name + ", which is not read");
+    }
     std::vector<std::pair<std::size_t, Eigen::Affine3d>> open;
     const Json& scenes = List(file_, "scenes");
     if (scenes.empty())
@@ -92,12 +100,20 @@ public:
       const auto [index, parent] = open.back();
       open.pop_back();
       if (!seen.insert(index).second)
-        place_.Fail("node " + std::to_string(index) + " hangs on two others");
+        place_.Fail("node " + std::to_string(index) + " occurs twice in its scene");
       const Json& node = Item("nodes", index);
       const Eigen::Affine3d place = parent * PlaceOf(node);
-      if (node.contains("mesh"))
-        for (const Json& primitive : List(Item("meshes", Whole(node["mesh"])), "primitives"))
+      if (node.contains("mesh")) {
+        const Json& mesh = Item("meshes", Whole(node["mesh"]));
+        bool isBent = node.contains("skin");
+        for (const Json* weights : {&List(mesh, "weights"), &List(node, "weights")})
+          for (const Json& weight : *weights)
+            isBent = isBent || place_.Number(weight) != 0.0;
+        if (isBent)
+          place_.Fail("node " + std::to_string(index) + " bends its mesh by a skin or morph targets, which are not read");
+        for (const Json& primitive : List(mesh, "primitives"))
           Add(primitive, place);
+      }
       add(List(node, "children"), place);
     }
     return std::move(mesh_);
@@ -109,6 +125,9 @@ private:
   {
     if (content.substr(0, 4) != "glTF")
       return content;
+    if (content.size() < 12 || Word(content.data() + 4) != 2)
+      place_.Fail("it is no binary glTF 2");
+    content = content.substr(0, Word(content.data() + 8)); // what follows is not of it
     std::string_view json;
     for (std::size_t at = 12; at + 8 <= content.size();) {
       const std::size_t size = Word(content.data() + at);
@@ -186,16 +205,19 @@ private:
     const Json& buffer = Item("buffers", index);
     if (!buffer.contains("uri"))
       return embedded_;
-    const auto [found, isNew] = buffers_.try_emplace(index);
+    const std::string uri = place_.Text(buffer["uri"]);
+    const bool isData = uri.compare(0, 5, "data:") == 0;
+    if (!isData && uri.find(':') != std::string::npos)
+      place_.Fail("its data lie at " + uri + ", which is no file beside it");
+    const std::string file = isData ? "data:" + std::to_string(index)
+                                    : (std::filesystem::path(path_).parent_path() / FromUri(uri)).lexically_normal().string();
+    const auto [found, isNew] = buffers_.try_emplace(file);
     if (isNew) {
-      const std::string uri = place_.Text(buffer["uri"]);
-      if (uri.compare(0, 5, "data:") == 0)
-        found->second = FromBase64(std::string_view(uri).substr(std::min(uri.find(','), uri.size() - 1) + 1));
-      else if (uri.find(':') != std::string::npos)
-        place_.Fail("its data lie at " + uri + ", which is no file beside it");
-      else
-        found->second = ReadMeshContent((std::filesystem::path(path_).parent_path() / FromUri(uri)).string());
+      found->second =
+          isData ? FromBase64(std::string_view(uri).substr(std::min(uri.find(','), uri.size() - 1) + 1)) : ReadMeshContent(file);
       bytes_ += found->second.size();
+      if (bytes_ > LargestMeshFile)
+        place_.Fail("it has more than 2 GiB, with the files that it names");
     }
     return found->second;
   }
@@ -211,7 +233,7 @@ private:
   {
     const Json& accessor = Item("accessors", index);
     if (!accessor.contains("bufferView") || accessor.contains("sparse"))
-      place_.Fail("accessor " + std::to_string(index) + " is sparse, which is not read");
+      place_.Fail("accessor " + std::to_string(index) + " is sparse, or has no bufferView, which is not read");
     if (place_.Text(place_.Member(accessor, "type")) != shape)
       place_.Fail("accessor " + std::to_string(index) + " is no " + shape);
     const std::size_t type = Whole(place_.Member(accessor, "componentType")), count = Whole(place_.Member(accessor, "count"));
@@ -224,7 +246,8 @@ private:
       bytes = bytes.substr(begin, length);
     };
     cut(Whole(view, "byteOffset", 0), Whole(place_.Member(view, "byteLength")));
-    const std::size_t stride = Whole(view, "byteStride", size), begin = Whole(accessor, "byteOffset", 0);
+    const std::size_t said = Whole(view, "byteStride", 0), stride = said == 0 ? size : said,
+                      begin = Whole(accessor, "byteOffset", 0);
     if (stride < size || stride > 252)
       place_.Fail("the byteStride of a bufferView is " + std::to_string(stride));
     cut(begin, count == 0 ? 0 : std::min(count - 1, bytes.size()) * stride + size);
@@ -236,9 +259,12 @@ private:
     if (!primitive.is_object())
       place_.Fail("a primitive of a mesh is no object");
     const std::size_t mode = Whole(primitive, "mode", 4); // 4: triangles, 5: strips, 6: fans; others are no surfaces
-    if (mode < 4 || mode > 6)
+    if (++shown_ > bytes_)
+      place_.Fail("it asks for far more than its size can hold");
+    const Json& attributes = place_.Member(primitive, "attributes");
+    if (mode < 4 || mode > 6 || !attributes.is_object() || !attributes.contains("POSITION"))
       return;
-    const Numbers points = Accessor(Whole(place_.Member(place_.Member(primitive, "attributes"), "POSITION")), "VEC3");
+    const Numbers points = Accessor(Whole(attributes["POSITION"]), "VEC3");
     if (points.type != 5126)
       place_.Fail("the points of a mesh are no floats");
     std::vector<std::uint32_t> corners;
@@ -294,8 +320,9 @@ private:
   std::string content_;
   std::string_view embedded_;
   Json file_;
-  std::map<std::size_t, std::string> buffers_;
-  std::size_t bytes_ = content_.size(); // with those buffers
+  std::map<std::string, std::string> buffers_; // by file
+  std::size_t bytes_ = content_.size();        // with those buffers
+  std::size_t shown_ = 0;                      // primitives
   PolygonMesh mesh_;
 };
 

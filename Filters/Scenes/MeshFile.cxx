@@ -18,8 +18,6 @@
 namespace echorama {
 namespace {
 
-constexpr std::size_t LargestFile = std::size_t{2} << 30;
-
 class PlyDecoder {
 public:
   explicit PlyDecoder(const std::string& path) : path_(path), content_(ReadMeshContent(path)), rest_(content_) {}
@@ -117,7 +115,7 @@ private:
     }
     for (int axis = 0; axis < 3; ++axis)
       if (isVertex && std::count(axisOf.begin(), axisOf.end(), axis) != 1)
-        Fail("its vertices have not one x, one y and one z");
+        Fail("its vertices do not have exactly one x, one y and one z");
     for (std::size_t n = 0; n < element.count; ++n) {
       Eigen::Vector3d point = Eigen::Vector3d::Zero();
       for (std::size_t i = 0; i < element.properties.size(); ++i) {
@@ -219,9 +217,9 @@ std::string ReadMeshContent(const std::string& path)
 {
   std::error_code unknown; // then reading says why
   const std::uintmax_t size = std::filesystem::file_size(path, unknown);
-  if (!unknown && size > LargestFile)
+  if (!unknown && size > LargestMeshFile)
     FailFile(path, "it has " + std::to_string(size) + " bytes; a mesh of its format may have 2 GiB");
-  return ReadTextFile(path, LargestFile);
+  return ReadTextFile(path, LargestMeshFile);
 }
 
 PolygonMesh ReadPly(const std::string& path)
@@ -231,18 +229,30 @@ PolygonMesh ReadPly(const std::string& path)
 
 PolygonMesh ReadObj(const std::string& path)
 {
-  std::string content = ReadMeshContent(path);
-  for (std::size_t at = content.find('\\'); at != std::string::npos; at = content.find('\\', at + 1))
-    if (const std::size_t end = content.find_first_not_of(" \t\r", at + 1); end < content.size() && content[end] == '\n')
-      std::fill(content.begin() + static_cast<std::ptrdiff_t>(at), content.begin() + static_cast<std::ptrdiff_t>(end) + 1, ' ');
-  PolygonMesh mesh;
+  const std::string content = ReadMeshContent(path);
+  std::string_view rest = content;
   std::size_t number = 0;
   const auto fail = [&](const std::string& what) { FailFile(path, "line " + std::to_string(number) + ": " + what); };
-  for (std::string_view rest = content; !rest.empty();) {
-    const std::size_t end = std::min(rest.find('\n'), rest.size());
-    const auto words = SplitWords(rest.substr(0, std::min(end, rest.find('#'))));
-    rest.remove_prefix(std::min(end + 1, rest.size()));
+  const auto next = [&] { // without a comment
+    const std::string_view line = rest.substr(0, rest.find('\n'));
+    rest.remove_prefix(std::min(line.size() + 1, rest.size()));
     ++number;
+    return TrimBlanks(line.substr(0, line.find('#')));
+  };
+  PolygonMesh mesh;
+  while (!rest.empty()) {
+    std::string_view line = next();
+    if (line.empty() || (line[0] != 'v' && line[0] != 'f'))
+      continue;
+    std::string joined; // with the lines that it goes on in
+    while (line.back() == '\\') {
+      if (joined.empty())
+        joined = line;
+      joined.back() = ' ';
+      joined += next();
+      line = joined;
+    }
+    const auto words = SplitWords(line);
     if (words.empty())
       continue;
     if (words[0] == "v") {
@@ -255,13 +265,18 @@ PolygonMesh ReadObj(const std::string& path)
       const auto points = static_cast<std::int64_t>(mesh.points.size());
       for (std::size_t i = 1; i < words.size(); ++i) {
         std::int64_t corner = 0; // from 1, or back from the last
-        if (!ParseNumber(words[i].substr(0, words[i].find('/')), corner) || corner == 0 || corner < -points || corner > points)
-          fail("a face names point \"" + std::string(words[i].substr(0, 40)) + "\"; there are " + std::to_string(points));
+        if (!ParseNumber(words[i].substr(0, words[i].find('/')), corner) || corner == 0 || corner < -points ||
+            corner > 4294967295)
+          fail("a face names point \"" + std::string(words[i].substr(0, 40)) + "\"");
         mesh.corners.push_back(static_cast<std::uint32_t>(corner > 0 ? corner - 1 : points + corner));
       }
       mesh.ends.push_back(mesh.corners.size());
     }
   }
+  for (const std::uint32_t corner : mesh.corners) // which may come before their points
+    if (corner >= mesh.points.size())
+      FailFile(path, "a face names point " + std::to_string(std::size_t{corner} + 1) + "; there are " +
+                         std::to_string(mesh.points.size()));
   return mesh;
 }
 

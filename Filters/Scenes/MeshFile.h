@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
+#include <cstddef>
 #include <cstdint>
 #include <Eigen/Core>
 #include <string>
 #include <vector>
 
 namespace echorama {
+
+constexpr std::size_t LargestMeshFile = std::size_t{2} << 30; ///< bytes, with the files that it names
 
 /// The polygons of a mesh file, as they stand there.
 struct PolygonMesh {
@@ -25,8 +28,9 @@ PolygonMesh ReadPly(const std::string& path);
 /// Wavefront OBJ: v and f. Faces that differ in normals or texture alone share their points; other statements are passed over.
 PolygonMesh ReadObj(const std::string& path);
 
-/// glTF 2.0, as text or binary (.glb): the triangles of the default scene, where its nodes place them. Sparse accessors and what
-/// extensions must say, such as compressed meshes, are refused.
+/// glTF 2.0, as text or binary (.glb): the triangles of the default scene, where its nodes place them. Refused are sparse
+/// accessors, skins, morph targets with a weight, and files that require an extension that is not of materials, textures or
+/// lights.
 PolygonMesh ReadGltf(const std::string& path);
 
 /// All of a file, as these read it: the size is looked at first.

@@ -9,6 +9,7 @@
 #include "vtkCellArray.h"
 #include "vtkCommand.h"
 #include "vtkDataArray.h"
+#include "vtkDataArraySelection.h"
 #include "vtkExecutive.h"
 #include "vtkNew.h"
 #include "vtkPoints.h"
@@ -45,6 +46,11 @@ vtkSmartPointer<vtkPolyData> Read(const std::string& path)
     reader->SetParserErrorObserver(listener); // an object of its own
   }
   reader->SetFileName(path.c_str());
+  if constexpr (std::is_same_v<Reader, vtkXMLPolyDataReader>) {
+    reader->UpdateInformation();
+    reader->GetPointDataArraySelection()->DisableAllArrays(); // nobody needs them, and they may be damaged
+    reader->GetCellDataArraySelection()->DisableAllArrays();
+  }
   reader->Update();
   const std::string problem = echorama::ReasonAmong(complaints);
   if (!problem.empty()) {
@@ -56,13 +62,18 @@ vtkSmartPointer<vtkPolyData> Read(const std::string& path)
 // What VTK's filters believe of cells.
 void CheckCells(vtkCellArray* cells, vtkIdType points, const std::string& path)
 {
-  double range[2] = {0.0, 0.0};
-  if (cells->GetNumberOfConnectivityIds() > 0) {
-    cells->GetConnectivityArray()->GetRange(range);
+  bool good = cells->IsValid();
+  for (vtkIdType i = 0; good && i < cells->GetNumberOfCells(); ++i) {
+    good = cells->GetCellSize(i) > 2;
   }
-  if (!cells->IsValid() || range[0] < 0.0 || range[1] >= static_cast<double>(std::max<vtkIdType>(points, 1))) {
+  if (good && cells->GetNumberOfConnectivityIds() > 0) {
+    double range[2];
+    cells->GetConnectivityArray()->GetRange(range);
+    good = range[0] >= 0.0 && range[1] < static_cast<double>(points);
+  }
+  if (!good) {
     throw Error(Error::Kind::BadFile,
-                path + ": its polygons are damaged: they name points that are not there, or end before they begin");
+                path + ": its polygons are damaged: they have fewer than three corners, or name points that are not there");
   }
 }
 

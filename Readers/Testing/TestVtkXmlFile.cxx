@@ -81,6 +81,11 @@ TEST_F(VtkXmlFile, ElementsThatVtkWouldNotSurviveAreRefused)
   Refused(" -->", "", "comment has no end");
   Refused("Name=\"a 'b'\"", "Name=\"a 'b'", "has no end");
   Refused("Name", "type=\"UInt8\" Name", "twice");
+  Refused("Name", "NumberOfComponents\n=\"-3\" Name", "NumberOfComponents");
+  Refused("<DataArray type=\"UInt8\"", "<Foo type=\"x\"/><DataArray type=\"UInt8\"", "Foo has the type \"x\"");
+  Refused("<ImageData", "<VTKFile type=\"ImageData\"/><ImageData", "or has two");
+  Refused("<VTKFile", "<x/><VTKFile", "does not begin with a VTKFile");
+  Refused("<Piece", "<Pieces", "no piece");
   Refused("<Piece", "<?a \"?><DataArray type=\"x\"/><?b \"?><Piece", "\"x\"");       // not within quotes
   Refused("<Piece", "<?a ><!-- ?><DataArray type=\"x\"/><?b --> ?><Piece", "\"x\""); // nor in a comment
 }

@@ -179,8 +179,12 @@ class Scenes(unittest.TestCase):
             writer.SetFileName(str(path))
             writer.Write()
             whole = path.read_text()
-            for count, words in (("-2147483648", "NumberOfPoints"), ("40", "points that are not there")):
-                path.write_text(whole.replace('NumberOfPoints="50"', f'NumberOfPoints="{count}"'))
+            for old, new, words in (('NumberOfPoints="50"', 'NumberOfPoints="-2147483648"', "NumberOfPoints"),
+                                    ('NumberOfPoints="50"', 'NumberOfPoints="40"', "points that are not there"),
+                                    ('NumberOfPoints="50"', 'NumberOfPoints="0"', "points that are not there"),
+                                    ("          3 6 9 12", "          1 6 9 12", "fewer than three corners")):
+                self.assertIn(old, whole)
+                path.write_text(whole.replace(old, new))
                 errors = self.errors_of(source(Scene=json.dumps({**SCENE, "tissue": [{"mesh": {"file": str(path), "material": "liver"}}]})))
                 self.assertIn(words, errors[0])
                 self.assertIn("p.vtp", errors[0])
