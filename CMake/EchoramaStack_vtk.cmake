@@ -4,7 +4,7 @@ set(ECHORAMA_VTK_COMPONENTS # what our modules use; find_package(Echorama) asks 
   FiltersCore FiltersGeneral FiltersSources IOCore IOGeometry IOImage IOXML IOLegacy ImagingCore ImagingGeneral ImagingMath ParallelCore
   InteractionStyle InteractionWidgets RenderingAnnotation RenderingCore RenderingFreeType RenderingOpenGL2
   RenderingVolume RenderingVolumeOpenGL2 RenderingImage)
-find_package(VTK 9.1 REQUIRED COMPONENTS ${ECHORAMA_VTK_COMPONENTS} FiltersHybrid ImagingFourier ImagingHybrid # the last three: peers in benchmarks
+find_package(VTK 9.1 REQUIRED COMPONENTS ${ECHORAMA_VTK_COMPONENTS} FiltersHybrid ImagingFourier ImagingHybrid IOPLY # the last four: peers in benchmarks
   Python WrappingPythonCore WrappingTools
   OPTIONAL_COMPONENTS GUISupportQt) # the windows' alone: other projects need no Qt
 find_package(Qt5 QUIET COMPONENTS OpenGL Widgets Test) # here, where VTK's targets look for it
