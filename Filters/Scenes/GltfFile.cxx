@@ -106,9 +106,11 @@ public:
       if (node.contains("mesh")) {
         const Json& mesh = Item("meshes", Whole(node["mesh"]));
         bool isBent = node.contains("skin");
-        for (const Json* weights : {&List(mesh, "weights"), &List(node, "weights")})
+        for (const Json* weights : {&List(mesh, "weights"), &List(node, "weights")}) {
+          Show(weights->size());
           for (const Json& weight : *weights)
             isBent = isBent || place_.Number(weight) != 0.0;
+        }
         if (isBent)
           place_.Fail("node " + std::to_string(index) + " bends its mesh by a skin or morph targets, which are not read");
         for (const Json& primitive : List(mesh, "primitives"))
@@ -205,7 +207,9 @@ private:
     const Json& buffer = Item("buffers", index);
     if (!buffer.contains("uri"))
       return embedded_;
-    const std::string uri = place_.Text(buffer["uri"]);
+    if (!buffer["uri"].is_string())
+      place_.Fail("the uri of a buffer is no text");
+    const auto& uri = buffer["uri"].get_ref<const std::string&>(); // not a copy for each accessor: it may hold all the data
     const bool isData = uri.compare(0, 5, "data:") == 0;
     if (!isData && uri.find(':') != std::string::npos)
       place_.Fail("its data lie at " + uri + ", which is no file beside it");
@@ -254,13 +258,20 @@ private:
     return {bytes.data(), count, stride, type};
   }
 
+  // What nodes show of a mesh takes time, though no triangle may come of it.
+  void Show(std::size_t parts)
+  {
+    shown_ += parts;
+    if (shown_ > bytes_)
+      place_.Fail("it asks for far more than its size can hold");
+  }
+
   void Add(const Json& primitive, const Eigen::Affine3d& place)
   {
     if (!primitive.is_object())
       place_.Fail("a primitive of a mesh is no object");
     const std::size_t mode = Whole(primitive, "mode", 4); // 4: triangles, 5: strips, 6: fans; others are no surfaces
-    if (++shown_ > bytes_)
-      place_.Fail("it asks for far more than its size can hold");
+    Show(1);
     const Json& attributes = place_.Member(primitive, "attributes");
     if (mode < 4 || mode > 6 || !attributes.is_object() || !attributes.contains("POSITION"))
       return;
@@ -322,7 +333,7 @@ private:
   Json file_;
   std::map<std::string, std::string> buffers_; // by file
   std::size_t bytes_ = content_.size();        // with those buffers
-  std::size_t shown_ = 0;                      // primitives
+  std::size_t shown_ = 0;                      // primitives and weights
   PolygonMesh mesh_;
 };
 

@@ -310,6 +310,7 @@ TEST_F(GltfFile, WhatIsDamagedIsRefusedWithTheReason)
   Refused("\"byteStride\": 16", "\"byteStride\": 8", "byteStride");
   Refused("\"byteStride\": 16", "\"byteStride\": 253", "byteStride");
   Refused("\"buffer\": 0", "\"buffer\": 1", "buffers 1");
+  Refused("\"byteLength\": 92", "\"uri\": 3", "no text");
   Refused("\"byteLength\": 92", "\"uri\": \"https://a/b\"", "no file beside it");
   Refused("\"asset\"", "\"extensionsRequired\": [\"KHR_draco_mesh_compression\"], \"asset\"", "KHR_draco_mesh_compression");
 }
@@ -344,6 +345,20 @@ TEST_F(GltfFile, FewBytesDoNotBecomeManyPoints)
   replace(", \"indices\": 2", "");
   const std::string path = Put("a.glb", Glb(json, large));
   ExpectRefused([&] { ReadGltf(path); }, Error::Kind::BadFile, path, "far more than its size can hold");
+  // Nothing but weights, and primitives that are no surface.
+  std::string weights = "0", lines;
+  for (int i = 0; i < 500; ++i) {
+    weights += ", 0";
+    lines += "{\"attributes\": {}}, ";
+  }
+  for (const auto& [from, to] : {std::pair{std::string("\"primitives\": ["), "\"weights\": [" + weights + "], \"primitives\": ["},
+                                 {"\"primitives\": [", "\"primitives\": [" + lines}}) {
+    std::string other = Json("\"nodes\": [0]", "\"nodes\": [" + shown + "]");
+    other.replace(other.find("{\"mesh\": 0}"), 11, nodes);
+    other.replace(other.find(from), from.size(), to);
+    const std::string again = Put("b.glb", Glb(other, Data()));
+    ExpectRefused([&] { ReadGltf(again); }, Error::Kind::BadFile, again, "far more than its size can hold");
+  }
 }
 
 TEST_F(GltfFile, TruncatedAnywhereIsRefused)
