@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Readers/FileKind.h"
-
 #include "Core/Geometry/TransformFile.h"
+#include "Readers/DataFile.h"
 #include "Readers/SequenceFile.h"
 #include <filesystem>
 #include <fstream>
@@ -11,13 +11,10 @@ namespace {
 
 std::string FirstBytes(const std::string& path)
 {
-  std::string bytes(1 << 16, '\0');
   std::error_code none;
-  if (!std::filesystem::is_regular_file(path, none)) // a pipe would not even open
-    return {};
-  std::ifstream stream(path, std::ios::binary);
-  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(stream.gcount()));
+  std::ifstream stream(std::filesystem::is_regular_file(path, none) ? path : "", std::ios::binary); // a pipe would not even open
+  std::string bytes(1 << 16, '\0');
+  bytes.resize(ReadPieces(stream, bytes.data(), bytes.size()));
   return bytes;
 }
 

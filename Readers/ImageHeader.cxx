@@ -18,6 +18,7 @@
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <utility>
 
 namespace fs = std::filesystem;
 
@@ -72,21 +73,17 @@ FileFormat FormatOfContent(const std::string& path)
   }
   std::ifstream stream = OpenToRead(path);
   std::string start(4096, '\0');
-  stream.read(start.data(), static_cast<std::streamsize>(start.size()));
-  start.resize(static_cast<std::size_t>(stream.gcount()));
+  start.resize(ReadPieces(stream, start.data(), start.size()));
   if (start.empty())
     fail(stream.bad() ? Error::Kind::FileSystem : Error::Kind::BadFile, stream.bad() ? "it cannot be read" : "the file is empty");
 
-  if (LooksLikeDicom(start))
-    return FileFormat::Dicom;
-  if (LooksLikeKretz(start))
-    return FileFormat::Kretz;
-  if (LooksLikeNifti(start))
-    return FileFormat::Nifti;
-  if (LooksLikeVdb(start))
-    return FileFormat::Vdb;
-  if (LooksLikeImage(start))
-    return FileFormat::ImageStack;
+  for (const auto& [looksLike, format] : {std::pair(&LooksLikeDicom, FileFormat::Dicom),
+                                          {&LooksLikeKretz, FileFormat::Kretz},
+                                          {&LooksLikeNifti, FileFormat::Nifti},
+                                          {&LooksLikeVdb, FileFormat::Vdb},
+                                          {&LooksLikeImage, FileFormat::ImageStack}})
+    if (looksLike(start))
+      return format;
   if (start.compare(0, 4, "NRRD") == 0)
     return FileFormat::Nrrd;
   if (start.find("<VTKFile") != std::string::npos && start.find("ImageData") != std::string::npos)

@@ -7,7 +7,6 @@
 #include "Readers/HeaderLines.h"
 #include "Readers/ImageHeader.h"
 #include <algorithm>
-#include <array>
 #include <map>
 #include <set>
 

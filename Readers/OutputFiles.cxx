@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Readers/OutputFiles.h"
-
 #include "Core/Base/Error.h"
 #include "Readers/ImageHeader.h"
 #include "Readers/SequenceFile.h"

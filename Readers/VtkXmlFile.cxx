@@ -8,21 +8,23 @@
 #include "Core/Base/NumberText.h"
 #include "Core/Base/Words.h"
 #include "Readers/ByteOrder.h"
+#include "Readers/DataFile.h"
 #include "Readers/HeaderLines.h"
 #include <algorithm>
 #include <array>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <limits>
 #include <map>
 #include <optional>
+#include <tuple>
 
 namespace echorama {
 namespace {
 
 constexpr std::size_t LongestElement = 1 << 20;
 constexpr std::uint64_t LargestRatio = 10000; // of what compressed data can become
+constexpr std::string_view AppendedMark = "<AppendedData";
 constexpr std::string_view Base64Digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
 struct XmlElement {
@@ -67,7 +69,9 @@ public:
         Piece(*element);
       } else if (name == "DataArray" || name == "Array" || element->Find("type")) // VTK reads arrays of any name
         Array(*element);
-      else if (name == "AppendedData") {
+      else if (name.compare(0, AppendedMark.size() - 1, AppendedMark.substr(1)) == 0) {
+        if (name.size() >= AppendedMark.size())
+          FailAtMark();
         Appended(*element);
         break; // what follows is no XML
       } else if (name == "/VTKFile")
@@ -99,13 +103,11 @@ private:
           text.clear();
           break;
         }
-        if (text[0] == '?')
-          continue;
-        if (quote == 0 && (c == '"' || c == '\''))
-          quote = static_cast<char>(c);
-        else if (c == quote)
-          quote = 0;
+        if (text[0] != '?' && (c == quote || (quote == 0 && (c == '"' || c == '\''))))
+          quote = quote == 0 ? static_cast<char>(c) : '\0';
       }
+      if (text.find(AppendedMark) != std::string::npos)
+        FailAtMark();
       if (text.empty() || text[0] == '?')
         continue;
       if (text[0] == '!')
@@ -117,14 +119,19 @@ private:
 
   void SkipComment()
   {
-    char before[2] = {0, 0};
-    for (int c = stream_.get(); c != std::char_traits<char>::eof(); c = stream_.get()) {
-      if (c == '>' && before[0] == '-' && before[1] == '-')
-        return;
-      before[0] = before[1];
-      before[1] = static_cast<char>(c);
-    }
-    lines_.Fail("it cannot be read as a VTK file: a comment has no end");
+    std::string part; // up to a >
+    do {
+      if (!std::getline(stream_, part, '>') || stream_.eof())
+        lines_.Fail("it cannot be read as a VTK file: a comment has no end");
+      if (part.find(AppendedMark) != std::string::npos)
+        FailAtMark();
+    } while (part.size() < 2 || part.compare(part.size() - 2, 2, "--") != 0);
+  }
+
+  // VTK looks for the mark in the bytes, whatever it is part of.
+  [[noreturn]] void FailAtMark() const
+  {
+    lines_.Fail("it cannot be read as a VTK file: it names appended data within a comment or another element");
   }
 
   // name key="value" key='value' /
@@ -175,9 +182,12 @@ private:
     return number;
   }
 
-  std::array<int, 6> Extent(const std::string& key, const std::string& text) const
+  std::array<int, 6> Extent(const XmlElement& element, const std::string& key) const
   {
-    const std::vector<int> numbers = lines_.Numbers<int>(key, text, 6);
+    const std::string* text = element.Find(key);
+    if (!text)
+      lines_.Fail("it cannot be read as a VTK file: " + element.name + " has no " + key);
+    const std::vector<int> numbers = lines_.Numbers<int>(key, *text, 6);
     std::array<int, 6> extent;
     std::copy(numbers.begin(), numbers.end(), extent.begin());
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -188,6 +198,14 @@ private:
     return extent;
   }
 
+  static double PointsOf(const std::array<int, 6>& extent)
+  {
+    double points = 1.0;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      points *= 1.0 + extent[2 * axis + 1] - extent[2 * axis];
+    return points;
+  }
+
   void File(const XmlElement& element)
   {
     Need(element, "type", {type_.c_str()}, false);
@@ -195,7 +213,7 @@ private:
     Need(element, "header_type", {"UInt32", "UInt64"}, true);
     const std::string* order = element.Find("byte_order");
     const std::string* header = element.Find("header_type");
-    swap_ = order && (*order == "BigEndian") != HostIsBigEndian;
+    isBigEndian_ = order ? *order == "BigEndian" : HostIsBigEndian;
     wordBytes_ = header && *header == "UInt64" ? 8 : 4;
     compressed_ = element.Find("compressor") && !element.Find("compressor")->empty();
     if (compressed_)
@@ -204,42 +222,36 @@ private:
 
   std::vector<std::string> Geometry(const XmlElement& element)
   {
-    const std::string* whole = element.Find("WholeExtent");
-    if (!whole)
-      lines_.Fail("it cannot be read as a VTK file: it has no WholeExtent");
-    whole_ = Extent("WholeExtent", *whole);
-    double voxels = 1.0;
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      voxels *= 1.0 + (*whole_)[2 * axis + 1] - (*whole_)[2 * axis];
-    if (voxels > static_cast<double>(LargestRatio * bytes_))
+    whole_ = Extent(element, "WholeExtent");
+    if (PointsOf(*whole_) > static_cast<double>(LargestRatio * bytes_))
       lines_.Fail("its WholeExtent needs more voxels than the file can hold");
     std::vector<std::string> notes;
-    const auto check = [&](const std::string& name, std::size_t count, const char* missing) {
+    for (const auto& [name, count, missing] :
+         {std::tuple("Origin", 3, "the file has no origin: 0 0 0 was assumed"),
+          {"Spacing", 3, "the file has no spacing: 1 mm was assumed"},
+          {"Direction", 9, "the file has no direction: its axes were taken as those of the world"}})
       if (const std::string* value = element.Find(name))
         lines_.Numbers<double>(name, *value, count);
       else
         notes.push_back(missing);
-    };
-    check("Origin", 3, "the file has no origin: 0 0 0 was assumed");
-    check("Spacing", 3, "the file has no spacing: 1 mm was assumed");
-    check("Direction", 9, "the file has no direction: its axes were taken as those of the world");
     return notes;
   }
 
-  void Piece(const XmlElement& element) const
+  void Piece(const XmlElement& element)
   {
     if (type_ == "PolyData") {
+      tuples_ = 0;
       for (const char* count : {"NumberOfPoints", "NumberOfVerts", "NumberOfLines", "NumberOfStrips", "NumberOfPolys"})
-        Number(element, count, 0, static_cast<std::int64_t>(LargestRatio * bytes_), 0);
+        tuples_ = std::max(tuples_, Number(element, count, 0, static_cast<std::int64_t>(LargestRatio * bytes_), 0));
       return;
     }
-    const std::string* text = element.Find("Extent");
-    if (!text || !whole_)
-      lines_.Fail("it cannot be read as a VTK file: a piece has no Extent, or lies in no image");
-    const std::array<int, 6> piece = Extent("Extent", *text);
+    if (!whole_)
+      lines_.Fail("it cannot be read as a VTK file: a piece lies in no image");
+    const std::array<int, 6> piece = Extent(element, "Extent");
     for (std::size_t axis = 0; axis < 3; ++axis)
       if (piece[2 * axis] < (*whole_)[2 * axis] || piece[2 * axis + 1] > (*whole_)[2 * axis + 1])
         lines_.Fail("the Extent of a piece lies beyond the WholeExtent");
+    tuples_ = static_cast<std::int64_t>(PointsOf(piece));
   }
 
   void Array(const XmlElement& element)
@@ -251,9 +263,12 @@ private:
     const std::int64_t most =
         static_cast<std::int64_t>(std::min<std::uint64_t>(LargestRatio * bytes_, std::numeric_limits<std::int64_t>::max() / 64));
     const std::int64_t components = Number(element, "NumberOfComponents", 1, 1000000, 1);
-    Number(element, "NumberOfTuples", 0, most / components, 0);
+    const std::int64_t tuples = Number(element, "NumberOfTuples", 0, most / components, tuples_);
+    values_ += static_cast<double>(components) * static_cast<double>(tuples);
+    if (values_ > static_cast<double>(most)) // VTK asks for their memory before it reads them
+      lines_.Fail("its arrays need more values than the file can hold");
     const std::string* format = element.Find("format");
-    if (format && *format == "appended") {
+    if (element.Find("offset") || (format && *format == "appended")) { // with an offset, VTK looks there whatever the format
       if (!element.Find("offset"))
         lines_.Fail(element.name + " has no offset of its appended data");
       later_.push_back(static_cast<std::uint64_t>(Number(element, "offset", 0, static_cast<std::int64_t>(bytes_), 0)));
@@ -316,8 +331,7 @@ private:
     stream_.seekg(static_cast<std::streamoff>(begin));
     if (encoding == VtkXmlEncoding::Raw) {
       bytes.resize(std::min<std::uint64_t>(wanted, end - std::min(begin, end)));
-      stream_.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-      bytes.resize(static_cast<std::size_t>(stream_.gcount()));
+      bytes.resize(ReadPieces(stream_, bytes.data(), bytes.size()));
     } else {
       std::uint32_t bits = 0;
       int held = 0;
@@ -338,17 +352,11 @@ private:
     }
     if (bytes.size() != wanted)
       lines_.Fail("the data are truncated or damaged (they end early)");
-    if (swap_)
-      SwapBytes(bytes.data(), wordBytes_, count);
     std::vector<std::uint64_t> words(count);
-    for (std::size_t i = 0; i < count; ++i)
-      if (wordBytes_ == 8)
-        std::memcpy(&words[i], bytes.data() + 8 * i, 8);
-      else {
-        std::uint32_t word;
-        std::memcpy(&word, bytes.data() + 4 * i, 4);
-        words[i] = word;
-      }
+    for (std::size_t i = 0; i < wanted; ++i) {
+      const std::size_t place = isBigEndian_ ? wordBytes_ - 1 - i % wordBytes_ : i % wordBytes_;
+      words[i / wordBytes_] |= std::uint64_t{static_cast<unsigned char>(bytes[i])} << 8 * place;
+    }
     return words;
   }
 
@@ -356,9 +364,11 @@ private:
   HeaderLines lines_; // says what is wrong
   std::ifstream stream_;
   std::uint64_t bytes_;
-  bool swap_ = false, compressed_ = false, appended_ = false;
+  bool isBigEndian_ = false, compressed_ = false, appended_ = false;
   std::size_t wordBytes_ = 4;
   std::optional<std::array<int, 6>> whole_;
+  std::int64_t tuples_ = 0;          // of an array that does not say it: the points, or the cells when there are more
+  double values_ = 0.0;              // of all arrays
   std::vector<std::uint64_t> later_; // offsets of appended arrays
 };
 

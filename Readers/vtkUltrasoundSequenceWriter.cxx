@@ -19,7 +19,6 @@
 #include "vtkUltrasoundVoxelTypes.h"
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
 #include <set>
 

@@ -18,7 +18,7 @@ protected:
         "<VTKFile type='ImageData' version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt32\">\n"
         "<ImageData WholeExtent=\"2 3 0 1 0 0\" Origin=\"0 0 0\" Spacing=\"1 1 1\" Direction=\"1 0 0 0 1 0 0 0 1\">\n"
         "<Piece Extent=\"2 3 0 1 0 0\"><PointData>\n"
-        "<DataArray type=\"UInt8\" Name=\"a 'b'\" format=\"binary\" offset=\"0\">BAAAAAECAwQ=</DataArray>\n" // 4 bytes: 1 2 3 4
+        "<DataArray type=\"UInt8\" Name=\"a 'b'\" format=\"binary\">BAAAAAECAwQ=</DataArray>\n" // 4 bytes: 1 2 3 4
         "</PointData></Piece></ImageData>\n</VTKFile>\n";
     if (!from.empty()) {
       const std::size_t at = text.find(from);
@@ -90,11 +90,33 @@ TEST_F(VtkXmlFile, ElementsThatVtkWouldNotSurviveAreRefused)
   Refused("<Piece", "<?a ><!-- ?><DataArray type=\"x\"/><?b --> ?><Piece", "\"x\""); // nor in a comment
 }
 
+TEST_F(VtkXmlFile, ArraysThatAskForMoreThanTheFileCanHoldAreRefused)
+{
+  const std::string array = "<DataArray type=\"UInt8\"", million = array + " NumberOfComponents=\"1000000\"";
+  EXPECT_NO_THROW(CheckVtkXmlFile(File(array, million))); // of 4 points; the file has some 500 bytes
+  Refused(array, million + " Name=\"b\"/>" + million, "more values than the file can hold");
+  const std::string counts = "NumberOfPoints=\"2000\" NumberOfPolys=\"1000\"";
+  const std::string path = Put("a.vtp", "<VTKFile type=\"PolyData\"><PolyData><Piece " + counts + "><Points>" + array +
+                                            " NumberOfComponents=\"3000\"/></Points></Piece></PolyData></VTKFile>");
+  ExpectRefused([&] { CheckVtkXmlFile(path, "PolyData"); }, Error::Kind::BadFile, path, "more values");
+}
+
+TEST_F(VtkXmlFile, AppendedDataAreNamedByTheirElementAlone)
+{
+  for (const char* before : {"<!-- <AppendedData -->", "<!--- <<AppendedData>-->", "<?a <AppendedData?>",
+                             "<x y=\"<AppendedData\"/>", "<AppendedDataOfX/>", "<<AppendedData/>"})
+    Refused("<Piece", before + std::string("<Piece"), "names appended data within");
+  EXPECT_NO_THROW(CheckVtkXmlFile(File("<Piece", "<!-- AppendedData <appendedData --><x y=\"AppendedData\"/><Piece")));
+}
+
 TEST_F(VtkXmlFile, LengthsInFrontOfDataAreChecked)
 {
   Refused("BAAAAAECAwQ=", "BAAA", "end early");
   Refused("BAAAAAECAwQ=", "////fwECAwQ=", "length");
-  Refused("\"binary\"", "\"appended\"", "appended, and there are none");
+  Refused("\"binary\"", "\"appended\"", "no offset of its appended data");
+  Refused("\"binary\"", "\"appended\" offset=\"0\"", "appended, and there are none");
+  for (const char* format : {"", "format=\"ascii\" ", "format=\"binary\" "}) // VTK goes by the offset alone
+    Refused("format=\"binary\"", format + std::string("offset=\"0\""), "appended, and there are none");
   Blocks("AQAAAAgAAAAAAAAACAAAAA==", "");       // one block of 8 bytes, none of them in a last one, 8 compressed
   Blocks("AQAAAAAAAAAAAAAACAAAAA==", "length"); // blocks of no bytes
   Blocks("AQAAAAgAAAAAAAAA////fw==", "length"); // more compressed bytes than the file has
@@ -105,10 +127,12 @@ TEST_F(VtkXmlFile, LengthsInFrontOfDataAreChecked)
 
 TEST_F(VtkXmlFile, AppendedDataAreCheckedWhereTheyLie)
 {
-  const auto appended = [&](const std::string& data, const std::string& encoding, const std::string& offset = "0") {
+  const auto appended = [&](const std::string& data, const std::string& encoding, const std::string& offset = "0",
+                            const std::string& format = "appended") {
     std::string text = "<VTKFile type=\"ImageData\" byte_order=\"BigEndian\">\n<ImageData WholeExtent=\"0 1 0 1 0 0\">"
-                       "<Piece Extent=\"0 1 0 1 0 0\"><PointData><DataArray type=\"UInt8\" format=\"appended\" offset=\"" +
-                       offset + "\"/></PointData></Piece></ImageData><AppendedData encoding=\"" + encoding + "\">\n _";
+                       "<Piece Extent=\"0 1 0 1 0 0\"><PointData><DataArray type=\"UInt8\" format=\"" +
+                       format + "\" offset=\"" + offset + "\"/></PointData></Piece></ImageData><AppendedData encoding=\"" +
+                       encoding + "\">\n _";
     return Put("a.vti", text + data + "</AppendedData></VTKFile>");
   };
   const std::string good("\0\0\0\4\1\2\3\4", 8), bad("\4\0\0\0\1\2\3\4", 8);
@@ -121,7 +145,11 @@ TEST_F(VtkXmlFile, AppendedDataAreCheckedWhereTheyLie)
   refused(appended("BAAAAAECAwQ=", "base64"));
   refused(appended(good, "raw", "400"));
   refused(appended(good, "raw", "-1"));
-  refused(appended(good, "raw\">x")); // _ is not the first
+  refused(appended(good, "raw\">x"));              // _ is not the first
+  for (const char* format : {"ascii", "binary"}) { // of which VTK takes no notice, where there is an offset
+    EXPECT_EQ(CheckVtkXmlFile(appended(good, "raw", "0", format)).size(), 3u);
+    refused(appended(bad, "raw", "0", format));
+  }
 }
 
 TEST_F(VtkXmlFile, CountsOfPolygonsAreChecked)
