@@ -3,7 +3,9 @@
 
 #include "Core/Base/Error.h"
 #include "Core/Base/VtkMessage.h"
+#include "Filters/Tissue/StlFile.h"
 #include "MeshFile.h"
+#include "Readers/ImageHeader.h"
 #include "Readers/VtkXmlFile.h"
 #include "vtkCallbackCommand.h"
 #include "vtkCellArray.h"
@@ -15,22 +17,19 @@
 #include "vtkPoints.h"
 #include "vtkPolyData.h"
 #include "vtkSmartPointer.h"
-#include "vtkSTLReader.h"
 #include "vtkUltrasoundTriangles.h"
 #include "vtkXMLPolyDataReader.h"
 
 #include <algorithm>
 #include <filesystem>
-#include <type_traits>
 #include <vector>
 
 using echorama::Error;
 
 namespace {
 
-// What a reader complains of becomes the reason of an error.
-template <class Reader>
-vtkSmartPointer<vtkPolyData> Read(const std::string& path)
+// What the reader complains of becomes the reason of an error.
+vtkSmartPointer<vtkPolyData> ReadVtp(const std::string& path)
 {
   std::vector<std::string> complaints;
   vtkNew<vtkCallbackCommand> listener;
@@ -39,18 +38,14 @@ vtkSmartPointer<vtkPolyData> Read(const std::string& path)
     static_cast<std::vector<std::string>*>(list)->push_back(
         echorama::SentenceOfVtkMessage(text ? static_cast<const char*>(text) : ""));
   });
-  vtkNew<Reader> reader;
+  vtkNew<vtkXMLPolyDataReader> reader;
   reader->AddObserver(vtkCommand::ErrorEvent, listener);
   reader->GetExecutive()->AddObserver(vtkCommand::ErrorEvent, listener);
-  if constexpr (std::is_same_v<Reader, vtkXMLPolyDataReader>) {
-    reader->SetParserErrorObserver(listener); // an object of its own
-  }
+  reader->SetParserErrorObserver(listener); // an object of its own
   reader->SetFileName(path.c_str());
-  if constexpr (std::is_same_v<Reader, vtkXMLPolyDataReader>) {
-    reader->UpdateInformation();
-    reader->GetPointDataArraySelection()->DisableAllArrays(); // nobody needs them, and they may be damaged
-    reader->GetCellDataArraySelection()->DisableAllArrays();
-  }
+  reader->UpdateInformation();
+  reader->GetPointDataArraySelection()->DisableAllArrays(); // nobody needs them, and they may be damaged
+  reader->GetCellDataArraySelection()->DisableAllArrays();
   reader->Update();
   const std::string problem = echorama::ReasonAmong(complaints);
   if (!problem.empty()) {
@@ -106,28 +101,34 @@ echorama::TriangleSurface echorama::ReadMesh(const std::string& path)
   if (!std::filesystem::is_regular_file(path, unknown)) {
     throw Error(Error::Kind::FileSystem, path + ": there is no such file");
   }
-  std::string extension = std::filesystem::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  const std::string extension = LowerExtension(path);
   vtkSmartPointer<vtkPolyData> data;
+  TriangleSurface surface;
   if (extension == ".glb" || extension == ".gltf") {
     data = PolyDataOf(ReadGltf(path));
   } else if (extension == ".ply") {
     data = PolyDataOf(ReadPly(path));
   } else if (extension == ".stl") {
-    data = Read<vtkSTLReader>(path);
+    surface = SurfaceOfStl(path, ReadMeshContent(path));
+    const auto hasTwoAlike = [](const auto& triangle) {
+      return triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0];
+    };
+    surface.triangles.erase(std::remove_if(surface.triangles.begin(), surface.triangles.end(), hasTwoAlike),
+                            surface.triangles.end());
   } else if (extension == ".obj") {
     data = PolyDataOf(ReadObj(path));
   } else if (extension == ".vtp") {
     CheckVtkXmlFile(path, "PolyData");
-    data = Read<vtkXMLPolyDataReader>(path);
+    data = ReadVtp(path);
     CheckCells(data->GetPolys(), data->GetNumberOfPoints(), path);
     CheckCells(data->GetStrips(), data->GetNumberOfPoints(), path);
   } else {
     throw Error(Error::Kind::BadFile, path + ": its extension is none of a mesh (.glb, .gltf, .ply, .stl, .obj, .vtp)");
   }
 
-  echorama::TriangleSurface surface;
-  echorama::AddTriangles(surface, data);
+  if (data) {
+    echorama::AddTriangles(surface, data);
+  }
   if (surface.triangles.empty()) {
     throw Error(Error::Kind::BadFile, path + ": there are no triangles in it");
   }

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The mesh lies beside the calibration as binary STL, which every program for meshes reads; its checksum is in the calibration,
-// so that a mesh which was replaced is noticed. STL repeats the points of every triangle: they are joined again by their bits.
+// so that a mesh which was replaced is noticed. STL repeats the points of every triangle: they are joined again.
 #include "SurfaceFile.h"
 #include "Core/Base/Checksum.h"
 #include "Core/Base/DescribedJson.h"
 #include "Core/Base/FileReplacement.h"
 #include "Core/Base/FormatText.h"
 #include "Core/Base/TextFile.h"
+#include "Filters/Tissue/StlFile.h"
 #include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <map>
 #include <system_error>
 
 namespace echorama {
@@ -307,8 +307,7 @@ SurfaceMapState StateOf(const SurfaceKeys& keys)
   return state;
 }
 
-// Binary STL: 80 bytes of anything, the number of triangles, then 50 bytes each: normal, three corners, two bytes of nothing.
-constexpr std::size_t StlHead = 84, StlTriangle = 50;
+constexpr std::size_t StlHead = 84, StlTriangle = 50; // bytes: see StlFile.cxx
 
 std::string StlOf(const TriangleSurface& surface)
 {
@@ -327,34 +326,6 @@ std::string StlOf(const TriangleSurface& surface)
     at += StlTriangle;
   }
   return bytes;
-}
-
-TriangleSurface SurfaceOfStl(const std::string& path, const std::string& bytes)
-{
-  std::uint32_t count = 0;
-  if (bytes.size() >= StlHead)
-    std::memcpy(&count, bytes.data() + 80, 4);
-  if (bytes.size() < StlHead || bytes.size() != StlHead + StlTriangle * static_cast<std::size_t>(count))
-    FailFile(path, "it is no binary STL, or ends early");
-  TriangleSurface surface;
-  std::map<std::array<std::uint32_t, 3>, std::uint32_t> numbers; // of points, by their bits
-  for (std::size_t t = 0; t < count; ++t) {
-    std::array<std::uint32_t, 3> triangle{};
-    for (std::size_t corner = 0; corner < 3; ++corner) {
-      const char* at = bytes.data() + StlHead + StlTriangle * t + 12 * (corner + 1);
-      std::array<std::uint32_t, 3> bits{};
-      std::memcpy(bits.data(), at, 12);
-      const auto [place, isNew] = numbers.emplace(bits, static_cast<std::uint32_t>(surface.points.size()));
-      if (isNew) {
-        Eigen::Vector3f point;
-        std::memcpy(point.data(), at, 12);
-        surface.points.push_back(point);
-      }
-      triangle[corner] = place->second;
-    }
-    surface.triangles.push_back(triangle);
-  }
-  return surface;
 }
 
 } // namespace

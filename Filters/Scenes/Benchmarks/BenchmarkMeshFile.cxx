@@ -2,6 +2,7 @@
 // Reading a mesh that VTK wrote, with ours and VTK's reader in turn. Error: the largest distance between a corner of a triangle
 // that was read and that which was written.
 #include "Filters/Scenes/MeshFile.h"
+#include "Filters/Tissue/StlFile.h"
 #include "Testing/Benchmark.h"
 #ifdef ECHORAMA_WITH_VTK
 #include "vtkCellArray.h"
@@ -17,6 +18,8 @@
 #include "vtkPolyData.h"
 #include "vtkSmartPointer.h"
 #include "vtkSphereSource.h"
+#include "vtkSTLReader.h"
+#include "vtkSTLWriter.h"
 #include <algorithm>
 #include <filesystem>
 #include <limits>
@@ -50,6 +53,15 @@ Corners CornersOf(const PolygonMesh& mesh)
   return corners;
 }
 
+Corners CornersOf(const TriangleSurface& surface)
+{
+  Corners corners;
+  for (const auto& triangle : surface.triangles)
+    for (const std::uint32_t corner : triangle)
+      corners.emplace_back(surface.points[corner].cast<double>());
+  return corners;
+}
+
 double Off(const Corners& read, const Corners& written)
 {
   double off = read.size() == written.size() ? 0.0 : std::numeric_limits<double>::infinity();
@@ -75,7 +87,7 @@ void Case(const std::string& name, const std::string& path, Writer* writer, cons
   writer->SetFileName(path.c_str());
   writer->Write();
   vtkSmartPointer<Reader> reader;
-  PolygonMesh mesh;
+  decltype(decode(path)) mesh;
   const auto [seconds, vtkSeconds] = Duel([&] { mesh = decode(path); },
                                           [&] {
                                             reader =
@@ -103,12 +115,16 @@ int main()
   const Corners written = CornersOf(data);
   const std::string size = std::to_string(written.size() / 3) + " triangles, ";
   const vtkNew<vtkPLYWriter> binary, text;
+  const vtkNew<vtkSTLWriter> stl, stlText;
   const vtkNew<vtkOBJWriter> obj;
   const vtkNew<vtkGLTFWriter> gltf;
   binary->SetInputData(data);
   text->SetInputData(data);
   text->SetFileTypeToASCII();
   obj->SetInputData(data);
+  stl->SetInputData(data);
+  stl->SetFileTypeToBinary();
+  stlText->SetInputData(data);
   const vtkNew<vtkMultiBlockDataSet> scene, actor;
   actor->SetBlock(0, data);
   scene->SetBlock(0, actor);
@@ -116,6 +132,9 @@ int main()
   gltf->InlineDataOn();
   Case<vtkPLYReader>(size + "PLY, binary", (folder / "b.ply").string(), binary.Get(), written, ReadPly);
   Case<vtkPLYReader>(size + "PLY, text", (folder / "t.ply").string(), text.Get(), written, ReadPly);
+  const auto readStl = [](const std::string& path) { return SurfaceOfStl(path, ReadMeshContent(path)); };
+  Case<vtkSTLReader>(size + "STL, binary", (folder / "b.stl").string(), stl.Get(), written, readStl);
+  Case<vtkSTLReader>(size + "STL, text", (folder / "t.stl").string(), stlText.Get(), written, readStl);
   Case<vtkOBJReader>(size + "OBJ", (folder / "o.obj").string(), obj.Get(), written, ReadObj);
   Case<vtkGLTFReader>(size + "glTF, data as text", (folder / "g.gltf").string(), gltf.Get(), written, ReadGltf);
   std::filesystem::remove_all(folder);

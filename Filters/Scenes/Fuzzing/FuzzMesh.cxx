@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Any bytes as a PLY or a glTF file, or, where they begin as neither, as an OBJ file. No corner of what is accepted lies beyond
-// the points.
+// Any bytes as a PLY, STL or glTF file, or, where they begin as none of these, as an OBJ file. No corner of what is accepted lies
+// beyond the points.
 #include "Filters/Scenes/MeshFile.h"
+#include "Filters/Tissue/StlFile.h"
 #include "Testing/Fuzzing.h"
 #include <string_view>
 
@@ -12,12 +13,20 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const MemoryFile file(data, size);
   return Survives([&] {
     const std::string_view content(reinterpret_cast<const char*>(data), size);
+    if (content.substr(0, 5) == "solid" || content.substr(0, 6) == "binary") {
+      const TriangleSurface surface = SurfaceOfStl(file.Path(), content);
+      for (const auto& triangle : surface.triangles)
+        for (const std::uint32_t corner : triangle)
+          if (corner >= surface.points.size())
+            std::abort(); // a finding
+      return;
+    }
     const bool isPly = content.substr(0, 3) == "ply", isGltf = content.substr(0, 4) == "glTF" || content.substr(0, 1) == "{";
     const PolygonMesh mesh = isPly ? ReadPly(file.Path()) : isGltf ? ReadGltf(file.Path()) : ReadObj(file.Path());
     std::size_t begin = 0;
     for (const std::size_t end : mesh.ends) {
       if (end < begin + 3 || end > mesh.corners.size())
-        std::abort(); // a finding
+        std::abort();
       begin = end;
     }
     for (const std::uint32_t corner : mesh.corners)

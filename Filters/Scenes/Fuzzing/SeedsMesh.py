@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""SeedsMesh.py DIR: small PLY, OBJ and glTF files for the fuzzer to start from."""
+"""SeedsMesh.py DIR: small PLY, STL, OBJ and glTF files for the fuzzer to start from."""
 import base64
 import struct
 import sys
@@ -26,6 +26,9 @@ seeds = {
     "triangle.obj": b"# a\no a\nv 0 0 0\nv 1 0 0 1.0\nv 0 1 0\nvn 0 0 1\nvt 0 0\nf 1/1/1 2//1 3\n",
     "backwards.obj": b"v 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nv 0 0 1\r\nf -1 -2 \\\r\n -3 -4\r\ns off\r\n",
 }
+facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1e0 0 0\n vertex -0 1 0.5\nendloop\nendfacet\n"
+seeds["text.stl"] = f"solid a\n{facet}{facet}endsolid a\nSOLID\nENDSOLID\n".encode()
+seeds["bytes.stl"] = struct.pack("<80sI", b"binary", 2) + 2 * (struct.pack("<3f", 0, 0, 1) + struct.pack("<9f", *points) + b"\0\0")
 DATA = struct.pack("<9f3B3H3I", *points, 0, 1, 2, 0, 1, 2, 0, 1, 2)
 
 
