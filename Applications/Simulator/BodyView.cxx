@@ -172,6 +172,7 @@ void BodyView::Fit()
 {
   ShowProbe();
   ShowImage();
+  ShowNeedle();
   const Eigen::Vector3d up = scan_->SkinNormal(), x = scan_->ProbeToWorld().linear().col(0), y = -up.cross(x).normalized();
   const Eigen::Vector3d from = (0.85 * y - 0.35 * x + 0.4 * up).normalized();
   vtkCamera* camera = renderer_->GetActiveCamera();
@@ -188,6 +189,7 @@ void BodyView::FitToSize()
   renderer_->ResetCameraClippingRange();
   renderer_->GetActiveCamera()->GetPosition(fittedFrom_.data());
   std::copy_n(canvas_->renderWindow()->GetSize(), 2, fittedSize_.begin());
+  isNeedleFitted_ = needle_->IsShown();
 }
 
 void BodyView::ShowProbe()
@@ -235,9 +237,11 @@ void BodyView::DrawNow()
   ShowProbe();
   ShowImage();
   ShowNeedle();
-  // What nobody has turned or zoomed stays fitted; a body may even be there before the view has a size.
+  // What nobody has turned or zoomed stays fitted; a body may even be there before the view has a size. A needle that comes is
+  // seen whole, unless a hand holds something here.
+  const bool needleCame = needle_->IsShown() && !isNeedleFitted_ && !isDragging_;
   if (std::equal(fittedFrom_.begin(), fittedFrom_.end(), renderer_->GetActiveCamera()->GetPosition()) &&
-      !std::equal(fittedSize_.begin(), fittedSize_.end(), canvas_->renderWindow()->GetSize()))
+      (needleCame || !std::equal(fittedSize_.begin(), fittedSize_.end(), canvas_->renderWindow()->GetSize())))
     FitToSize();
   renderer_->ResetCameraClippingRange();
   const Clock::time_point start = Clock::now();

@@ -67,6 +67,7 @@ private:
   int waitMs_;                         ///< until what has changed is drawn
   std::array<double, 3> fittedFrom_{}; ///< where the camera was put; and for a view of so many pixels
   std::array<int, 2> fittedSize_{};
+  bool isNeedleFitted_ = false;
   QString shownProbe_; ///< what the probe's surface was made for
   QPoint last_;
   QPointF grabbed_; ///< from the probe to where it was taken

@@ -2,6 +2,8 @@
 #include "ScanLog.h"
 #include "Core/Base/Error.h"
 #include "Scan.h"
+#include <algorithm>
+#include <cmath>
 #include <QCryptographicHash>
 #include <QJsonArray>
 #include <QJsonDocument>
@@ -22,7 +24,8 @@ namespace echorama {
 
 namespace {
 
-const QString SchemaStem = "echorama-scan-"; ///< the version follows
+const QString SchemaStem = "echorama-scan-";      ///< the version follows
+constexpr double MostFrames = 9007199254740992.0; ///< JSON's numbers are exact up to here, 2^53
 
 void AddBytes(QCryptographicHash& hash, const void* bytes, vtkIdType size)
 {
@@ -218,7 +221,10 @@ ScanLog ScanLog::Read(const QString& path)
     if (!entry.frame.probeToWorld.matrix().allFinite() || !IsRotation(entry.frame.probeToWorld.linear()))
       FailLine(path, line, "ProbeToWorld is no rigid pose");
     entry.frame.seconds = object["seconds"].toDouble();
-    entry.frame.number = static_cast<std::int64_t>(object["number"].toDouble());
+    const double number = object["number"].toDouble();
+    if (!(number >= 0.0 && number <= MostFrames && number == std::floor(number)))
+      FailLine(path, line, "its number is not that of a frame");
+    entry.frame.number = static_cast<std::int64_t>(number);
     entry.frame.isInAir = object["air"].toBool();
     entry.frame.isFlipped = object["flipped"].toBool();
     if (object.contains("Needle"))

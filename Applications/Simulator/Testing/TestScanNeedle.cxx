@@ -19,6 +19,7 @@
 #include <QJsonObject>
 #include <QLabel>
 #include <QLineEdit>
+#include <QLineF>
 #include <QPushButton>
 #include <QSignalSpy>
 #include <QTimer>
@@ -37,6 +38,7 @@ private slots:
   void itGoesAlongItsAxisAndIsSeenThere();
   void aGuideGoesWithTheProbeAndAHandStays();
   void itCrossesThePlaneFromAGuideBeside();
+  void oneThatComesIsSeenWholeUnlessTheViewWasTurned();
   void aMouseBringsTurnsAndAdvancesIt();
   void boneStopsIt();
   void aTrackedToolIsTheNeedle();
@@ -212,6 +214,35 @@ void TestScanNeedle::itCrossesThePlaneFromAGuideBeside()
   const auto mark = window.Scan().Scanner().MarkedTip();
   QVERIFY(mark &&
           std::hypot(mark->x() - InProbe(window, needle.Now().tip)[0], mark->y() - InProbe(window, needle.Now().tip)[2]) < 1e-6);
+}
+
+void TestScanNeedle::oneThatComesIsSeenWholeUnlessTheViewWasTurned()
+{
+  SimulatorUnderTest window;
+  QVERIFY(window.Open({body::WriteWithBall(Folder())}));
+  NeedleTool& needle = *window.Window().TheNeedle();
+  BodyView& view = *window.Window().Body();
+  window.Scan().SetControl("NeedleLengthMm", "1000");
+  const auto hub = [&] {
+    const Vector3d end = needle.Now().tip - 1000.0 * needle.Now().direction;
+    return view.ToCanvas(end.data()).toPoint();
+  };
+  view.Fit();
+  window.Key(Qt::Key_N);
+  window.Frame();
+  QVERIFY(needle.IsShown());
+  QVERIFY2(view.Canvas()->rect().contains(hub()), qPrintable(QString("%1, %2").arg(hub().x()).arg(hub().y())));
+  window.Key(Qt::Key_N);
+  view.Fit();
+  window.Wheel(view.Canvas(), 2);
+  window.Frame();
+  const Vector3d middle = Vector3d::Zero(), side(20.0, 0.0, 0.0);
+  const auto scale = [&] { return QLineF(view.ToCanvas(middle.data()), view.ToCanvas(side.data())).length(); };
+  const double before = scale();
+  window.Key(Qt::Key_N);
+  window.Frame();
+  QVERIFY(needle.IsShown());
+  QCOMPARE(scale(), before);
 }
 
 void TestScanNeedle::aMouseBringsTurnsAndAdvancesIt()

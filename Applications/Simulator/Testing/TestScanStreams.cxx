@@ -241,6 +241,11 @@ void TestScanStreams::aDamagedRecordingIsNamed()
   QByteArray without = frame;
   without.replace("controls", "control");
   QVERIFY(read(head + without).contains("no controls"));
+  for (const char* number : {"1e300", "-1", "1.5"}) {
+    QByteArray other = frame;
+    other.replace("\"number\":1", QByteArray("\"number\":") + number);
+    QVERIFY2(read(head + other).contains("line 2: its number"), number);
+  }
 }
 
 void TestScanStreams::aRecordedSweepGivesTheVolumeBack()
