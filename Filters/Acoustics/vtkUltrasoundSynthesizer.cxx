@@ -106,7 +106,18 @@ echorama::ParameterList vtkUltrasoundSynthesizer::Parameters()
   auto& v = this->Own;
   const std::string otherwise = " Not used with a probe input.";
   echorama::ParameterList values = Describe(this->Values);
-  echorama::Named(values, "Sampling").When("Mode", "coherent"); // counting spreads its rays by Sobol's sequence
+  // Counting has rays of its own, which know neither pulse nor beam. WideBeams says so itself.
+  SynthesisParameters other;
+  const echorama::ParameterList model = Without(Describe(static_cast<echorama::EchoModel&>(other)),
+                                                {"Mode", "DynamicRangeDb", "WideBeams"}),
+                                sound = Without(Describe(other.transducer), {"AssumedSoundSpeed"}),
+                                scatterers = {echorama::Named(values, "ScatterersPerMm3"),
+                                              echorama::Named(values, "InvisibleDb")};
+  for (const Parameter& unused : echorama::Join({model, sound, scatterers})) {
+    if (Parameter& mine = echorama::Named(values, unused.name); mine.whenName.empty()) {
+      mine.When("Mode", "coherent");
+    }
+  }
   return echorama::Join(
       {{Parameter("Position", v.position, {}, "mm", "Where the middle of the probe's face lies in the world." + otherwise),
         Parameter("Orientation", v.orientation, {}, "degrees",

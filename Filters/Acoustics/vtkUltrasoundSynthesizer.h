@@ -121,19 +121,25 @@ public:
   /** Samples along a beam. In [2, 16384]; default 512. */
   vtkUltrasoundIntegerMacro(Samples);
 
-  /** Centre frequency of the pulse. In [0.5, 60] MHz; default 3.5. */
+  /** Centre frequency of the pulse. Used when Mode is coherent. In [0.5, 60] MHz; default 3.5. */
   vtkUltrasoundNumberMacro(FrequencyMHz);
 
-  /** Width of the two-way spectrum at -6 dB, as a share of the centre frequency. In [0.05, 1.5]; default 0.6. */
+  /**
+   * Width of the two-way spectrum at -6 dB, as a share of the centre frequency. Used when Mode is coherent. In [0.05, 1.5];
+   * default 0.6.
+   */
   vtkUltrasoundNumberMacro(Bandwidth);
 
-  /** Width of the active aperture along the fan. In [0.1, 100] mm; default 14. */
+  /** Width of the active aperture along the fan. Used when Mode is coherent. In [0.1, 100] mm; default 14. */
   vtkUltrasoundNumberMacro(LateralApertureMm);
 
-  /** Way from the face to the transmit focus along the fan. In [1, 1000] mm; default 70. */
+  /** Way from the face to the transmit focus along the fan. Used when Mode is coherent. In [1, 1000] mm; default 70. */
   vtkUltrasoundNumberMacro(LateralFocusMm);
 
-  /** Whether receiving is focused at every depth along the fan; else at the transmit focus. Default on. */
+  /**
+   * Whether receiving is focused at every depth along the fan; else at the transmit focus. Used when Mode is coherent. Default
+   * on.
+   */
   vtkUltrasoundSwitchMacro(DynamicReceive);
 
   /**
@@ -142,10 +148,13 @@ public:
    */
   vtkUltrasoundNumberMacro(SmallestFNumber);
 
-  /** Width of the lens along the sweep. In [0.1, 100] mm; default 10. */
+  /** Width of the lens along the sweep. Used when Mode is coherent. In [0.1, 100] mm; default 10. */
   vtkUltrasoundNumberMacro(ElevationApertureMm);
 
-  /** Way from the face to the focus of the lens, for sending and receiving. In [1, 1000] mm; default 70. */
+  /**
+   * Way from the face to the focus of the lens, for sending and receiving. Used when Mode is coherent. In [1, 1000] mm; default
+   * 70.
+   */
   vtkUltrasoundNumberMacro(ElevationFocusMm);
 
   /** How the scanner turns time into depth. In [500, 5000] m/s; default 1540. */
@@ -184,33 +193,36 @@ public:
   void SetModeToCounting() { this->SetMode(COUNTING); }
   ///@}
 
-  /** Reflections that are followed. In [0, 100]; default 4. */
+  /** Reflections that are followed. Used when Mode is coherent. In [0, 100]; default 4. */
   vtkUltrasoundIntegerMacro(MaxBounces);
 
-  /** Whether rays bend where the speed of sound changes. Default on. */
+  /** Whether rays bend where the speed of sound changes. Used when Mode is coherent. Default on. */
   vtkUltrasoundSwitchMacro(Refraction);
 
   /**
-   * Share of the pressure that the face of the probe turns back; 0: no reverberation between probe and tissue. In [0, 1]; default
-   * 0.2.
+   * Share of the pressure that the face of the probe turns back; 0: no reverberation between probe and tissue. Used when Mode is
+   * coherent. In [0, 1]; default 0.2.
    */
   vtkUltrasoundNumberMacro(FaceReflection);
 
-  /** The face turns sound back up to this far from its middle. In [0, 1000] mm; default 20. */
+  /** The face turns sound back up to this far from its middle. Used when Mode is coherent. In [0, 1000] mm; default 20. */
   vtkUltrasoundNumberMacro(FaceRadiusMm);
 
   /**
    * How far from the normal of a surface its mirror echo is still received: standard deviation of a Gaussian, about the angle of
-   * half the aperture as seen from the focus. In [0.1, 90] degrees; default 5.
+   * half the aperture as seen from the focus. Used when Mode is coherent. In [0.1, 90] degrees; default 5.
    */
   vtkUltrasoundNumberMacro(AcceptanceDegrees);
 
-  /** The most straight pieces of one ray's way: a stop for scenes of many mirrors. In [1, 100000000]; default 10000. */
+  /**
+   * The most straight pieces of one ray's way: a stop for scenes of many mirrors. Used when Mode is coherent. In [1, 100000000];
+   * default 10000.
+   */
   vtkUltrasoundIntegerMacro(MaxSegments);
 
   /**
-   * Side lobes on either side of each beam along the fan; each costs about as much as the beam itself. 0: none. In [0, 20];
-   * default 0.
+   * Side lobes on either side of each beam along the fan; each costs about as much as the beam itself. 0: none. Used when Mode is
+   * coherent. In [0, 20]; default 0.
    */
   vtkUltrasoundIntegerMacro(SideLobes);
 
@@ -219,7 +231,7 @@ public:
   ///@{
   /**
    * What side and grating lobes are those of: rectangular has loud side lobes, hann and gaussian (a fifth of the aperture) faint
-   * ones. Default hann. There are RECTANGULAR, HANN, GAUSSIAN.
+   * ones. Used when Mode is coherent. Default hann. There are RECTANGULAR, HANN, GAUSSIAN.
    */
   vtkUltrasoundChoiceMacro(Apodisation);
   void SetApodisationToRectangular() { this->SetApodisation(RECTANGULAR); }
@@ -229,14 +241,20 @@ public:
 
   /**
    * From element to element of the array. Grating lobes lie where its sine of the angle is a multiple of wavelength / pitch. 0:
-   * no grating lobes. In [0, 10] mm; default 0.
+   * no grating lobes. Used when Mode is coherent. In [0, 10] mm; default 0.
    */
   vtkUltrasoundNumberMacro(PitchMm);
 
-  /** How wide an element is; narrow ones hear more of grating lobes. In [0.01, 1] pitches; default 0.9. */
+  /**
+   * How wide an element is; narrow ones hear more of grating lobes. Used when Mode is coherent. In [0.01, 1] pitches; default
+   * 0.9.
+   */
   vtkUltrasoundNumberMacro(ElementWidth);
 
-  /** Rays of an element, spread over its aperture. 1: the axis alone, fast and hard-edged. In [1, 4096]; default 8. */
+  /**
+   * Rays of an element, spread over its aperture. 1: the axis alone, fast and hard-edged. Used when Mode is coherent. In [1,
+   * 4096]; default 8.
+   */
   vtkUltrasoundIntegerMacro(SubRays);
 
   enum Samplings { RANDOM = 0, STRATIFIED = 1, SOBOL = 2 };
@@ -258,18 +276,21 @@ public:
   vtkUltrasoundSwitchMacro(WideBeams);
 
   /**
-   * Level of the echo of a perfect mirror, square to the beam, beside the mean speckle of the reference tissue. In [0, 120] dB;
-   * default 45.
+   * Level of the echo of a perfect mirror, square to the beam, beside the mean speckle of the reference tissue. Used when Mode is
+   * coherent. In [0, 120] dB; default 45.
    */
   vtkUltrasoundNumberMacro(MirrorDb);
 
   /**
    * The most scatterers that are made of any material; fewer are faster. 0: 10 in every resolution cell at the transmit focus.
-   * Volumes share their speckle when they have the same number. In [0, 1000] per mm^3; default 0.
+   * Volumes share their speckle when they have the same number. Used when Mode is coherent. In [0, 1000] per mm^3; default 0.
    */
   vtkUltrasoundNumberMacro(ScatterersPerMm3);
 
-  /** Ways of sound whose speckle would stay this far below black, after all gain, are not summed. In [0, 300] dB; default 12. */
+  /**
+   * Ways of sound whose speckle would stay this far below black, after all gain, are not summed. Used when Mode is coherent. In
+   * [0, 300] dB; default 12.
+   */
   vtkUltrasoundNumberMacro(InvisibleDb);
 
   /** Rays that each element sends. Used when Mode is counting. In [1, 10000000]; default 256. */

@@ -72,6 +72,35 @@ class Volumes(unittest.TestCase):
             self.assertEqual(image.GetFieldData().GetNumberOfArrays(), 4)
         self.assertIn("scatterers", synthesizer.GetNotes())
 
+    def test_counting_uses_what_is_said_to_be_used(self):
+        def counted(name=None, value=None):
+            synthesizer = small()
+            synthesizer.SetElements(4)
+            synthesizer.SetSteps(2)
+            synthesizer.SetModeToCounting()
+            synthesizer.SetRaysPerElement(30)
+            synthesizer.SetNoiseDb(-40)
+            if name:
+                synthesizer.SetParameterAsText(name, value)
+            synthesizer.Update(1)
+            return grey(synthesizer.GetOutput(1))
+
+        reference = counted()
+        self.assertGreater(reference.std(), 5)
+        for one in json.loads(small().GetParameterDescriptions()):
+            when = one.get("when", {})
+            if when.get("name") not in ("Mode", "DynamicReceive") or "counting" in when["values"]:
+                continue
+            other = {"switch": lambda: "off" if one["value"] else "on",
+                     "choice": lambda: next(choice for choice in one["choices"] if choice != one["value"])}
+            value = other.get(one["type"], lambda: str(one["low"] if one["value"] != one["low"] else one["high"]))()
+            with self.subTest(one["name"], value=value):
+                self.assertTrue((counted(one["name"], value) == reference).all())
+        for name, value in {"Seed": "2", "AssumedSoundSpeed": "1400", "GainDb": "10", "RaysPerElement": "20", "Clarity": "3",
+                            "ConeDegrees": "20", "MaxEvents": "1", "DynamicRangeDb": "40"}.items():
+            with self.subTest(name):
+                self.assertFalse((counted(name, value) == reference).all())
+
     def test_scan_conversion_of_the_beams_is_the_volume(self):
         synthesizer = small()
         converter = echorama.vtkUltrasoundScanConverter()
