@@ -4,11 +4,11 @@
 #include "Filters/Tissue/StlFile.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
-#include "Core/Base/Words.h"
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <limits>
-#include <tuple>
+#include <unordered_map>
 #include <vector>
 
 namespace echorama {
@@ -30,11 +30,34 @@ std::size_t BytesFor(std::string_view bytes)
   return bytes.size() < Head ? Head : Head + BytesOfTriangle * WordAt(bytes, Head - 4);
 }
 
-std::string Lower(std::string_view word)
+using PointBits = std::array<std::uint32_t, 3>;
+struct PointHash {
+  std::uint64_t salt; // which no file can know: points that would all come together cannot be chosen
+  std::size_t operator()(const PointBits& bits) const
+  {
+    std::uint64_t hash = salt ^ bits[0];
+    for (const std::uint32_t next : {bits[1], bits[2]})
+      hash = ((hash ^ hash >> 29) * 0x9E3779B97F4A7C15u) ^ next;
+    return hash ^ hash >> 32;
+  }
+};
+
+// Whatever its case.
+bool Is(std::string_view word, std::string_view lower)
 {
-  std::string lower(word.substr(0, 20));
-  std::transform(lower.begin(), lower.end(), lower.begin(), [](unsigned char c) { return std::tolower(c); });
-  return lower;
+  return std::equal(word.begin(), word.end(), lower.begin(), lower.end(),
+                    [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a - 'A' + 'a' : a) == b; });
+}
+
+// Takes the next one off a line; empty at its end.
+std::string_view Word(std::string_view& line)
+{
+  const auto isBlank = [](char c) { return c == ' ' || (c >= '\t' && c <= '\r'); };
+  const auto begin = std::find_if_not(line.begin(), line.end(), isBlank), end = std::find_if(begin, line.end(), isBlank);
+  const std::string_view word =
+      line.substr(static_cast<std::size_t>(begin - line.begin()), static_cast<std::size_t>(end - begin));
+  line.remove_prefix(static_cast<std::size_t>(end - line.begin()));
+  return word;
 }
 
 // Of one triangle after the other.
@@ -60,27 +83,26 @@ std::vector<Eigen::Vector3f> CornersOfText(const std::string& path, std::string_
   bool isOpen = false;  // a solid
   std::size_t ends = 0; // of the last triangle, in corners
   while (!rest.empty()) {
-    const std::string_view line = rest.substr(0, rest.find('\n'));
+    std::string_view line = rest.substr(0, rest.find('\n'));
     rest.remove_prefix(std::min(line.size() + 1, rest.size()));
     ++number;
-    const auto words = SplitWords(line);
-    if (words.empty())
-      continue;
-    const std::string key = Lower(words[0]);
-    if (key == "vertex") {
+    const std::string_view key = Word(line);
+    if (Is(key, "vertex")) {
       Eigen::Vector3d point;
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        if (words.size() != 4 || !ParseNumber(words[axis + 1], point[static_cast<Eigen::Index>(axis)]))
-          fail("a vertex that is not three numbers");
+      bool isGood = true;
+      for (int axis = 0; axis < 3; ++axis)
+        isGood = isGood && ParseNumber(Word(line), point[axis]);
+      if (!isGood || !Word(line).empty())
+        fail("a vertex that is not three numbers");
       corners.emplace_back(point.cast<float>());
-    } else if (key == "endloop") {
+    } else if (Is(key, "endloop")) {
       if (corners.size() != ends + 3)
         fail("a facet that has " + std::to_string(corners.size() - ends) + " vertices, not 3");
       ends = corners.size();
-    } else if (key == "solid" || key == "endsolid") {
-      isOpen = key == "solid";
-    } else if (key != "facet" && key != "outer" && key != "endfacet") {
-      fail("\"" + key + "\" is no word of STL");
+    } else if (Is(key, "solid") || Is(key, "endsolid")) {
+      isOpen = Is(key, "solid");
+    } else if (!key.empty() && !Is(key, "facet") && !Is(key, "outer") && !Is(key, "endfacet")) {
+      fail("\"" + std::string(key.substr(0, 20)) + "\" is no word of STL");
     }
   }
   if (isOpen || corners.size() != ends)
@@ -92,39 +114,24 @@ std::vector<Eigen::Vector3f> CornersOfText(const std::string& path, std::string_
 
 TriangleSurface SurfaceOfStl(const std::string& path, std::string_view bytes)
 {
-  const bool isBinary = bytes.size() == BytesFor(bytes) || Lower(bytes.substr(0, 5)) != "solid";
+  const bool isBinary = bytes.size() == BytesFor(bytes) || !Is(bytes.substr(0, 5), "solid");
   const std::vector<Eigen::Vector3f> corners = isBinary ? CornersOfBinary(path, bytes) : CornersOfText(path, bytes);
   if (corners.size() > std::numeric_limits<std::uint32_t>::max())
     FailFile(path, "it has too many triangles");
 
-  // Those that are alike come together when they are sorted, the first of them first. By their bits: not even what is no number
-  // upsets that order.
-  struct Corner {
-    std::array<std::uint32_t, 3> bits;
-    std::uint32_t place;
-    bool operator<(const Corner& other) const { return std::tie(bits, place) < std::tie(other.bits, other.place); }
-  };
-  std::vector<Corner> sorted(corners.size());
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    const Eigen::Vector3f point = corners[i].array() + 0.0f; // -0 is 0
-    std::memcpy(sorted[i].bits.data(), point.data(), 12);
-    sorted[i].place = static_cast<std::uint32_t>(i);
-  }
-  std::sort(sorted.begin(), sorted.end());
-  std::vector<std::uint32_t> first(corners.size()); // of the corners that lie here
-  for (std::size_t i = 0; i < sorted.size(); ++i)
-    first[sorted[i].place] = i > 0 && sorted[i].bits == sorted[i - 1].bits ? first[sorted[i - 1].place] : sorted[i].place;
-
   TriangleSurface surface;
   surface.triangles.resize(corners.size() / 3);
+  // A closed surface has half as many points as triangles.
+  const PointHash hash{reinterpret_cast<std::uintptr_t>(corners.data())};
+  std::unordered_map<PointBits, std::uint32_t, PointHash> numbers(corners.size() / 5, hash);
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    if (first[i] == i) {
-      first[i] = static_cast<std::uint32_t>(surface.points.size());
+    const Eigen::Vector3f point = corners[i].array() + 0.0f; // -0 is 0
+    PointBits bits;
+    std::memcpy(bits.data(), point.data(), sizeof bits);
+    const auto [found, isNew] = numbers.emplace(bits, static_cast<std::uint32_t>(surface.points.size()));
+    if (isNew)
       surface.points.push_back(corners[i]);
-    } else {
-      first[i] = first[first[i]]; // an earlier one, which has its number
-    }
-    surface.triangles[i / 3][i % 3] = first[i];
+    surface.triangles[i / 3][i % 3] = found->second;
   }
   return surface;
 }
