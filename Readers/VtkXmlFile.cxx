@@ -11,12 +11,12 @@
 #include "Readers/DataFile.h"
 #include "Readers/HeaderLines.h"
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <fstream>
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 #include <tuple>
 
 namespace echorama {
@@ -30,6 +30,7 @@ constexpr std::string_view Base64Digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijk
 struct XmlElement {
   std::string name; // "/name" at its end
   std::map<std::string, std::string> attributes;
+  bool isWhole = false; // <name/>
 
   const std::string* Find(const std::string& key) const
   {
@@ -37,8 +38,6 @@ struct XmlElement {
     return found == attributes.end() ? nullptr : &found->second;
   }
 };
-
-enum class VtkXmlEncoding { Raw, Base64 };
 
 class VtkXmlCheck {
 public:
@@ -50,37 +49,48 @@ public:
   std::vector<std::string> Run()
   {
     std::vector<std::string> notes;
-    bool found = false, isOpen = false, hasPiece = false;
+    bool found = false, isOpen = false;
+    int depth = 0;
     for (std::optional<XmlElement> element = Next(); element; element = Next()) {
       const std::string& name = element->name;
       if ((name == "VTKFile") == isOpen)
         lines_.Fail("it cannot be read as a VTK file: it does not begin with a VTKFile element, or has two");
       isOpen = true;
+      depth += element->isWhole ? 0 : name[0] == '/' ? -1 : 1;
+      if (depth > 100) // VTK would end
+        lines_.Fail("it cannot be read as a VTK file: its elements are nested too deeply");
       if (name == "VTKFile")
         File(*element);
-      else if (name == type_) {
+      else if (name.compare(0, AppendedMark.size() - 1, AppendedMark.substr(1)) == 0) {
+        if (name.size() >= AppendedMark.size())
+          FailAtMark();
+        Appended(*element);
+        break; // what follows is no XML
+      } else if (name == type_) {
         if (found)
           lines_.Fail("it has two " + type_ + " elements");
         found = true;
         if (type_ == "ImageData")
           notes = Geometry(*element);
       } else if (name == "Piece") {
-        hasPiece = true;
+        if (isInPiece_)
+          lines_.Fail("it has a piece within a piece");
+        isInPiece_ = !element->isWhole;
         Piece(*element);
-      } else if (name == "DataArray" || name == "Array" || element->Find("type")) // VTK reads arrays of any name
+      } else if (name == "/Piece")
+        isInPiece_ = false;
+      else if (name == "DataArray" || name == "Array" || element->Find("type")) // VTK reads arrays of any name
         Array(*element);
-      else if (name.compare(0, AppendedMark.size() - 1, AppendedMark.substr(1)) == 0) {
-        if (name.size() >= AppendedMark.size())
-          FailAtMark();
-        Appended(*element);
-        break; // what follows is no XML
-      } else if (name == "/VTKFile")
+      else if (name == "/VTKFile")
         break; // what follows is not of it
     }
-    if (!found || !hasPiece)
+    if (!found || !hasPiece_)
       lines_.Fail("it is no VTK file of this kind: it has no " + type_ + " element, or no piece of it");
     if (!later_.empty() && !appended_)
       lines_.Fail("its data are said to be appended, and there are none");
+    const double tuple = std::max(tupleBytes_, type_ == "PolyData" ? 24.0 : 1.0);   // a point, a voxel
+    if (fieldBytes_ + tuple * tuples_ > static_cast<double>(LargestRatio * bytes_)) // VTK asks for them before it reads
+      lines_.Fail("its arrays need more memory than the file justifies");
     return notes;
   }
 
@@ -141,6 +151,7 @@ private:
     XmlElement element;
     std::size_t at = std::min(text.find_first_of(blanks, 1), text.size());
     element.name = text.substr(0, at);
+    element.isWhole = text.back() == '/';
     if (element.name.back() == '/' && element.name.size() > 1) // <name/>
       element.name.pop_back();
     for (at = text.find_first_not_of(blanks, at); at < text.size(); at = text.find_first_not_of(blanks, at)) {
@@ -153,7 +164,7 @@ private:
                                     : text.find(text[open], open + 1);
       if (close == std::string_view::npos)
         lines_.Fail("it cannot be read as a VTK file: the attributes of " + element.name + " are damaged");
-      const std::string key(text.substr(at, std::min(equals, text.find_first_of(blanks, at)) - at));
+      const std::string key(text.substr(at, std::min(equals, text.find_first_of(" \t\r\n=", at)) - at));
       if (!element.attributes.emplace(key, text.substr(open + 1, close - open - 1)).second)
         lines_.Fail(element.name + " says " + key + " twice");
       at = close + 1;
@@ -182,28 +193,18 @@ private:
     return number;
   }
 
-  std::array<int, 6> Extent(const XmlElement& element, const std::string& key) const
+  std::vector<int> Extent(const XmlElement& element, const std::string& key) const
   {
     const std::string* text = element.Find(key);
     if (!text)
       lines_.Fail("it cannot be read as a VTK file: " + element.name + " has no " + key);
-    const std::vector<int> numbers = lines_.Numbers<int>(key, *text, 6);
-    std::array<int, 6> extent;
-    std::copy(numbers.begin(), numbers.end(), extent.begin());
+    const std::vector<int> extent = lines_.Numbers<int>(key, *text, 6);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const std::int64_t size = std::int64_t{extent[2 * axis + 1]} - extent[2 * axis] + 1;
       if (size < 1 || size > std::numeric_limits<int>::max())
         lines_.Fail("its " + key + " is empty or overflows");
     }
     return extent;
-  }
-
-  static double PointsOf(const std::array<int, 6>& extent)
-  {
-    double points = 1.0;
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      points *= 1.0 + extent[2 * axis + 1] - extent[2 * axis];
-    return points;
   }
 
   void File(const XmlElement& element)
@@ -223,8 +224,9 @@ private:
   std::vector<std::string> Geometry(const XmlElement& element)
   {
     whole_ = Extent(element, "WholeExtent");
-    if (PointsOf(*whole_) > static_cast<double>(LargestRatio * bytes_))
-      lines_.Fail("its WholeExtent needs more voxels than the file can hold");
+    tuples_ = 1.0;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      tuples_ *= 1.0 + whole_[2 * axis + 1] - whole_[2 * axis];
     std::vector<std::string> notes;
     for (const auto& [name, count, missing] :
          {std::tuple("Origin", 3, "the file has no origin: 0 0 0 was assumed"),
@@ -239,19 +241,19 @@ private:
 
   void Piece(const XmlElement& element)
   {
+    hasPiece_ = true;
+    tupleBytesHere_ = 0.0;
     if (type_ == "PolyData") {
-      tuples_ = 0;
       for (const char* count : {"NumberOfPoints", "NumberOfVerts", "NumberOfLines", "NumberOfStrips", "NumberOfPolys"})
-        tuples_ = std::max(tuples_, Number(element, count, 0, static_cast<std::int64_t>(LargestRatio * bytes_), 0));
+        tuples_ += static_cast<double>(Number(element, count, 0, static_cast<std::int64_t>(LargestRatio * bytes_), 0));
       return;
     }
-    if (!whole_)
+    if (whole_.empty())
       lines_.Fail("it cannot be read as a VTK file: a piece lies in no image");
-    const std::array<int, 6> piece = Extent(element, "Extent");
+    const std::vector<int> piece = Extent(element, "Extent");
     for (std::size_t axis = 0; axis < 3; ++axis)
-      if (piece[2 * axis] < (*whole_)[2 * axis] || piece[2 * axis + 1] > (*whole_)[2 * axis + 1])
+      if (piece[2 * axis] < whole_[2 * axis] || piece[2 * axis + 1] > whole_[2 * axis + 1])
         lines_.Fail("the Extent of a piece lies beyond the WholeExtent");
-    tuples_ = static_cast<std::int64_t>(PointsOf(piece));
   }
 
   void Array(const XmlElement& element)
@@ -259,19 +261,18 @@ private:
     Need(element, "type",
          {"Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Float32", "Float64", "String"}, false);
     Need(element, "format", {"ascii", "binary", "appended"}, true);
-    // An array in memory is never much larger than in the file.
-    const std::int64_t most =
-        static_cast<std::int64_t>(std::min<std::uint64_t>(LargestRatio * bytes_, std::numeric_limits<std::int64_t>::max() / 64));
-    const std::int64_t components = Number(element, "NumberOfComponents", 1, 1000000, 1);
-    const std::int64_t tuples = Number(element, "NumberOfTuples", 0, most / components, tuples_);
-    values_ += static_cast<double>(components) * static_cast<double>(tuples);
-    if (values_ > static_cast<double>(most)) // VTK asks for their memory before it reads them
-      lines_.Fail("its arrays need more values than the file can hold");
+    const std::string& type = *element.Find("type");
+    const std::size_t digits = type.find_first_of("1368");
+    const int bits = digits == std::string::npos ? 256 : std::stoi(type.substr(digits)); // a string has some
+    const double bytes = bits / 8.0 * static_cast<double>(Number(element, "NumberOfComponents", 1, 1000000, 1));
+    tupleBytesHere_ += hasPiece_ ? bytes : 0.0; // else of the field
+    tupleBytes_ = std::max(tupleBytes_, tupleBytesHere_);
+    fieldBytes_ += bytes * static_cast<double>(Number(element, "NumberOfTuples", 0, std::int64_t{1} << 40, 0));
     const std::string* format = element.Find("format");
     if (element.Find("offset") || (format && *format == "appended")) { // with an offset, VTK looks there whatever the format
       if (!element.Find("offset"))
         lines_.Fail(element.name + " has no offset of its appended data");
-      later_.push_back(static_cast<std::uint64_t>(Number(element, "offset", 0, static_cast<std::int64_t>(bytes_), 0)));
+      later_.insert(static_cast<std::uint64_t>(Number(element, "offset", 0, static_cast<std::int64_t>(bytes_), 0)));
       return;
     }
     for (const auto& [key, value] : element.attributes)
@@ -281,7 +282,7 @@ private:
       const std::uint64_t begin = Position();
       stream_.ignore(std::numeric_limits<std::streamsize>::max(), '<');
       const std::uint64_t end = stream_.eof() ? bytes_ : Position() - 1;
-      Lengths(begin, end, VtkXmlEncoding::Base64);
+      Lengths(begin, end, false);
       stream_.clear();
       stream_.seekg(static_cast<std::streamoff>(end));
     }
@@ -296,26 +297,25 @@ private:
       lines_.Fail("it cannot be read as a VTK file: its appended data have no beginning");
     const std::uint64_t begin = Position();
     for (const std::uint64_t offset : later_)
-      Lengths(begin + offset, bytes_, encoding && *encoding == "raw" ? VtkXmlEncoding::Raw : VtkXmlEncoding::Base64);
+      Lengths(begin + offset, bytes_, encoding && *encoding == "raw");
   }
 
   // The lengths in front of an array's data, which lie within [begin, end) of the file.
-  void Lengths(std::uint64_t begin, std::uint64_t end, VtkXmlEncoding encoding)
+  void Lengths(std::uint64_t begin, std::uint64_t end, bool isRaw)
   {
-    const auto words = [&](std::size_t count) { return Words(begin, end, count, encoding); };
     const std::uint64_t room = end - std::min(begin, end);
     const auto fail = [this] { lines_.Fail("the data are truncated or damaged (a length in them is not possible)"); };
     if (!compressed_) {
-      if (words(1)[0] > room)
+      if (Words(begin, end, 1, isRaw)[0] > room)
         fail();
       return;
     }
-    const std::vector<std::uint64_t> first = words(3);
+    const std::vector<std::uint64_t> first = Words(begin, end, 3, isRaw);
     const std::uint64_t blocks = first[0], block = first[1], last = first[2];
     if (blocks > room / wordBytes_ || (blocks > 0 && block == 0) || last > block || block > LargestRatio * bytes_)
       fail();
     std::uint64_t sum = 0;
-    const std::vector<std::uint64_t> all = words(3 + blocks);
+    const std::vector<std::uint64_t> all = Words(begin, end, 3 + blocks, isRaw);
     for (std::size_t i = 3; i < all.size(); ++i) {
       if (all[i] > room - std::min(sum, room))
         fail();
@@ -323,13 +323,13 @@ private:
     }
   }
 
-  std::vector<std::uint64_t> Words(std::uint64_t begin, std::uint64_t end, std::size_t count, VtkXmlEncoding encoding)
+  std::vector<std::uint64_t> Words(std::uint64_t begin, std::uint64_t end, std::size_t count, bool isRaw)
   {
     const std::size_t wanted = count * wordBytes_;
     std::string bytes;
     stream_.clear();
     stream_.seekg(static_cast<std::streamoff>(begin));
-    if (encoding == VtkXmlEncoding::Raw) {
+    if (isRaw) {
       bytes.resize(std::min<std::uint64_t>(wanted, end - std::min(begin, end)));
       bytes.resize(ReadPieces(stream_, bytes.data(), bytes.size()));
     } else {
@@ -366,10 +366,12 @@ private:
   std::uint64_t bytes_;
   bool isBigEndian_ = false, compressed_ = false, appended_ = false;
   std::size_t wordBytes_ = 4;
-  std::optional<std::array<int, 6>> whole_;
-  std::int64_t tuples_ = 0;          // of an array that does not say it: the points, or the cells when there are more
-  double values_ = 0.0;              // of all arrays
-  std::vector<std::uint64_t> later_; // offsets of appended arrays
+  std::vector<int> whole_; // extent
+  bool hasPiece_ = false, isInPiece_ = false;
+  double tuples_ = 0.0;                            // voxels, or points and cells of all pieces
+  double tupleBytes_ = 0.0, tupleBytesHere_ = 0.0; // of all arrays, for a voxel: of the piece with most of them, of this one
+  double fieldBytes_ = 0.0;                        // of what says its number of tuples, as arrays of no piece do
+  std::set<std::uint64_t> later_;                  // offsets of appended arrays
 };
 
 } // namespace

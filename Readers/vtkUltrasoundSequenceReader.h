@@ -44,7 +44,6 @@
 
 #include <memory> // for what is open
 #include <string> // for the notes
-#include <vector> // for the notes
 
 class vtkPolyData;
 

@@ -239,6 +239,7 @@ void BodyView::DrawNow()
   ShowNeedle();
   // What nobody has turned or zoomed stays fitted; a body may even be there before the view has a size. A needle that comes is
   // seen whole, unless a hand holds something here.
+  isNeedleFitted_ = isNeedleFitted_ && needle_->IsShown();
   const bool needleCame = needle_->IsShown() && !isNeedleFitted_ && !isDragging_;
   if (std::equal(fittedFrom_.begin(), fittedFrom_.end(), renderer_->GetActiveCamera()->GetPosition()) &&
       (needleCame || !std::equal(fittedSize_.begin(), fittedSize_.end(), canvas_->renderWindow()->GetSize())))

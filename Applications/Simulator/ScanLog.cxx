@@ -223,7 +223,7 @@ ScanLog ScanLog::Read(const QString& path)
     entry.frame.seconds = object["seconds"].toDouble();
     const double number = object["number"].toDouble();
     if (!(number >= 0.0 && number <= MostFrames && number == std::floor(number)))
-      FailLine(path, line, "its number is not that of a frame");
+      FailLine(path, line, "its number is no whole number from 0 to 2^53");
     entry.frame.number = static_cast<std::int64_t>(number);
     entry.frame.isInAir = object["air"].toBool();
     entry.frame.isFlipped = object["flipped"].toBool();

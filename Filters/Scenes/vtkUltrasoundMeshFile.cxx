@@ -110,11 +110,6 @@ echorama::TriangleSurface echorama::ReadMesh(const std::string& path)
     data = PolyDataOf(ReadPly(path));
   } else if (extension == ".stl") {
     surface = SurfaceOfStl(path, ReadMeshContent(path));
-    const auto hasTwoAlike = [](const auto& triangle) {
-      return triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0];
-    };
-    surface.triangles.erase(std::remove_if(surface.triangles.begin(), surface.triangles.end(), hasTwoAlike),
-                            surface.triangles.end());
   } else if (extension == ".obj") {
     data = PolyDataOf(ReadObj(path));
   } else if (extension == ".vtp") {

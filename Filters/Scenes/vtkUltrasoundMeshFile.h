@@ -8,7 +8,7 @@
 
 namespace echorama {
 
-/** The triangles of a mesh file that VTK reads, as they stand there. Throws Error that names the file. */
+/** The triangles of a mesh file, as they stand there. Throws Error that names the file. */
 ECHORAMAFILTERSSCENES_EXPORT TriangleSurface ReadMesh(const std::string& path);
 
 } // namespace echorama

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <Eigen/Geometry>
 #include <limits>
 #include <unordered_map>
 #include <vector>
@@ -25,9 +26,10 @@ std::uint32_t WordAt(std::string_view bytes, std::size_t at)
   return word;
 }
 
-std::size_t BytesFor(std::string_view bytes)
+void PutWord(std::string& bytes, std::size_t at, std::uint32_t word)
 {
-  return bytes.size() < Head ? Head : Head + BytesOfTriangle * WordAt(bytes, Head - 4);
+  for (std::size_t i = 0; i < 4; ++i, word >>= 8)
+    bytes[at + i] = static_cast<char>(word & 0xFF);
 }
 
 using PointBits = std::array<std::uint32_t, 3>;
@@ -60,13 +62,14 @@ std::string_view Word(std::string_view& line)
   return word;
 }
 
-// Of one triangle after the other.
+// Of one triangle after the other. All that are there: some programs write a wrong count, or none.
 std::vector<Eigen::Vector3f> CornersOfBinary(const std::string& path, std::string_view bytes)
 {
-  if (bytes.size() < BytesFor(bytes))
-    FailFile(path, "it is truncated or no STL file: it has " + std::to_string(bytes.size()) + " bytes; its triangles take " +
-                       std::to_string(BytesFor(bytes)));
-  std::vector<Eigen::Vector3f> corners(3 * std::size_t{WordAt(bytes, Head - 4)});
+  const std::size_t there = bytes.size() < Head ? 0 : (bytes.size() - Head) / BytesOfTriangle;
+  if (bytes.size() < Head || WordAt(bytes, Head - 4) > there)
+    FailFile(path, "it is truncated or no STL file: it has " + std::to_string(there) + " triangles" +
+                       (bytes.size() < Head ? "" : ", and says " + std::to_string(WordAt(bytes, Head - 4))));
+  std::vector<Eigen::Vector3f> corners(3 * there);
   for (std::size_t i = 0; i < corners.size(); ++i)
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const std::uint32_t word = WordAt(bytes, Head + BytesOfTriangle * (i / 3) + 12 * (1 + i % 3) + 4 * axis);
@@ -101,8 +104,8 @@ std::vector<Eigen::Vector3f> CornersOfText(const std::string& path, std::string_
       ends = corners.size();
     } else if (Is(key, "solid") || Is(key, "endsolid")) {
       isOpen = Is(key, "solid");
-    } else if (!key.empty() && !Is(key, "facet") && !Is(key, "outer") && !Is(key, "endfacet")) {
-      fail("\"" + std::string(key.substr(0, 20)) + "\" is no word of STL");
+    } else if (!key.empty() && !Is(key, "facet") && !Is(key, "outer") && !Is(key, "endfacet") && !Is(key, "color")) {
+      fail("it does not begin with a word of STL");
     }
   }
   if (isOpen || corners.size() != ends)
@@ -114,13 +117,17 @@ std::vector<Eigen::Vector3f> CornersOfText(const std::string& path, std::string_
 
 TriangleSurface SurfaceOfStl(const std::string& path, std::string_view bytes)
 {
-  const bool isBinary = bytes.size() == BytesFor(bytes) || !Is(bytes.substr(0, 5), "solid");
+  const std::string_view head = bytes.substr(0, Head),
+                         text = head.substr(std::min(head.find_first_not_of(" \t\r\n"), head.size()));
+  const bool isWhole = head.size() == Head && bytes.size() == Head + BytesOfTriangle * WordAt(bytes, Head - 4);
+  const bool isBinary = isWhole || !Is(text.substr(0, 5), "solid") || head.find('\0') != std::string_view::npos;
   const std::vector<Eigen::Vector3f> corners = isBinary ? CornersOfBinary(path, bytes) : CornersOfText(path, bytes);
   if (corners.size() > std::numeric_limits<std::uint32_t>::max())
     FailFile(path, "it has too many triangles");
 
   TriangleSurface surface;
-  surface.triangles.resize(corners.size() / 3);
+  surface.triangles.reserve(corners.size() / 3);
+  std::array<std::uint32_t, 3> triangle;
   // A closed surface has half as many points as triangles.
   const PointHash hash{reinterpret_cast<std::uintptr_t>(corners.data())};
   std::unordered_map<PointBits, std::uint32_t, PointHash> numbers(corners.size() / 5, hash);
@@ -131,9 +138,33 @@ TriangleSurface SurfaceOfStl(const std::string& path, std::string_view bytes)
     const auto [found, isNew] = numbers.emplace(bits, static_cast<std::uint32_t>(surface.points.size()));
     if (isNew)
       surface.points.push_back(corners[i]);
-    surface.triangles[i / 3][i % 3] = found->second;
+    triangle[i % 3] = found->second;
+    if (i % 3 == 2 && triangle[0] != triangle[1] && triangle[1] != triangle[2] && triangle[2] != triangle[0])
+      surface.triangles.push_back(triangle);
   }
   return surface;
+}
+
+std::string StlOf(const TriangleSurface& surface)
+{
+  std::string bytes(Head + BytesOfTriangle * surface.triangles.size(), '\0');
+  std::string_view("binary STL, mm").copy(bytes.data(), Head - 4);
+  PutWord(bytes, Head - 4, static_cast<std::uint32_t>(surface.triangles.size()));
+  std::size_t at = Head;
+  for (const auto& triangle : surface.triangles) {
+    const Eigen::Vector3f &a = surface.points[triangle[0]], &b = surface.points[triangle[1]], &c = surface.points[triangle[2]];
+    const Eigen::Vector3f cross = (b - a).cross(c - a);
+    const Eigen::Vector3f normal = cross.norm() > 0.0f ? Eigen::Vector3f(cross.normalized()) : Eigen::Vector3f::Zero();
+    for (const Eigen::Vector3f* part : {&normal, &a, &b, &c})
+      for (const float number : *part) {
+        std::uint32_t word = 0;
+        std::memcpy(&word, &number, 4);
+        PutWord(bytes, at, word);
+        at += 4;
+      }
+    at += 2;
+  }
+  return bytes;
 }
 
 } // namespace echorama

@@ -6,10 +6,13 @@
 namespace echorama {
 
 /// The triangles of an STL file, which repeats the points of each: those with the same coordinates are one again, in the order
-/// in which they first come. Binary is what has as many bytes as it needs for the triangles that it counts, or does not begin
-/// with "solid"; else it is text.
+/// in which they first come, and triangles with two corners alike are left out. Text begins with "solid"; binary files that do
+/// so, too, are known by their length or a byte 0.
 /// \param bytes of the file \param path names it in errors
 /// \throws Error(BadFile) when it is truncated or damaged
 TriangleSurface SurfaceOfStl(const std::string& path, std::string_view bytes);
+
+/// A surface as binary STL.
+std::string StlOf(const TriangleSurface& surface);
 
 } // namespace echorama

@@ -67,13 +67,13 @@ TEST_F(VtkXmlFile, ElementsThatVtkWouldNotSurviveAreRefused)
   Refused("LittleEndian", "MiddleEndian", "MiddleEndian");
   Refused("UInt32", "UInt31", "UInt31");
   Refused("Name", "NumberOfComponents=\"-3\" Name", "NumberOfComponents");
-  Refused("Name", "NumberOfTuples=\"100000000000\" Name", "NumberOfTuples");
+  Refused("Name", "NumberOfTuples=\"100000000000\" Name", "more memory than the file justifies");
   Refused("Piece Extent=\"2 3", "Piece Extent=\"1 3", "beyond the WholeExtent");
   Refused("Piece Extent=\"2 3", "Piece Extent=\"3 2", "empty");
   Refused("Piece Extent=\"2 3 0 1 0 0\"", "Piece", "no Extent");
   Refused("2 3 0 1 0 0", "2 3 0 1 0", "6 are needed");
   Refused("2 3 0 1 0 0", "-2147483648 2147483647 0 1 0 0", "overflows");
-  Refused("2 3 0 1 0 0", "0 99999 0 99999 0 99999", "more voxels than the file can hold");
+  Refused("2 3 0 1 0 0", "0 99999 0 99999 0 99999", "more memory than the file justifies");
   Refused("Spacing=\"1 1 1\"", "Spacing=\"1 x 1\"", "Spacing");
   Refused("type='ImageData'", "type='PolyData'", "PolyData");
   Refused("<ImageData", "<ImageDatum", "lies in no image");
@@ -94,11 +94,49 @@ TEST_F(VtkXmlFile, ArraysThatAskForMoreThanTheFileCanHoldAreRefused)
 {
   const std::string array = "<DataArray type=\"UInt8\"", million = array + " NumberOfComponents=\"1000000\"";
   EXPECT_NO_THROW(CheckVtkXmlFile(File(array, million))); // of 4 points; the file has some 500 bytes
-  Refused(array, million + " Name=\"b\"/>" + million, "more values than the file can hold");
-  const std::string counts = "NumberOfPoints=\"2000\" NumberOfPolys=\"1000\"";
-  const std::string path = Put("a.vtp", "<VTKFile type=\"PolyData\"><PolyData><Piece " + counts + "><Points>" + array +
-                                            " NumberOfComponents=\"3000\"/></Points></Piece></PolyData></VTKFile>");
-  ExpectRefused([&] { CheckVtkXmlFile(path, "PolyData"); }, Error::Kind::BadFile, path, "more values");
+  const std::string words = "more memory than the file justifies", second = array + " Name=\"b\" ";
+  Refused(array, million + " Name=\"b\"/>" + million, words);
+  Refused(array, array + " NumberOfTuples=\"0\" NumberOfComponents=\"1000000\" Name=\"b\"/>" + million,
+          words);                                                                                           // VTK does not ask it
+  Refused(array, "<DataArray type=\"Float64\" Name=\"b\" NumberOfComponents=\"1000000\"/>" + array, words); // 8 bytes each
+  Refused("<Piece", "<FieldData>" + second + "NumberOfTuples=\"9000000\"/></FieldData><Piece", words);
+  const std::string path = File(array, million), whole = "WholeExtent=\"2 3"; // for all of it, not for the piece
+  std::ifstream stream(path);
+  std::string text((std::istreambuf_iterator<char>(stream)), {});
+  Put("a.vti", text.replace(text.find(whole), whole.size(), "WholeExtent=\"2 9"));
+  ExpectRefused([&] { CheckVtkXmlFile(path); }, Error::Kind::BadFile, path, words);
+  EXPECT_NO_THROW(CheckVtkXmlFile(File("<Piece", "<FieldData>" + second + "NumberOfComponents=\"1000000\"/></FieldData><Piece")));
+  Refused("<PointData>", "<Piece Extent=\"2 3 0 1 0 0\"/><PointData>", "a piece within a piece");
+}
+
+TEST_F(VtkXmlFile, PolygonsThatAskForMoreThanTheFileCanHoldAreRefused)
+{
+  const auto file = [&](int pieces, int points, int components) {
+    std::string text = "<VTKFile type=\"PolyData\"><PolyData>";
+    for (int i = 0; i < pieces; ++i)
+      text += "<Piece NumberOfPoints=\"" + std::to_string(points) + "\">" +
+              (components == 0
+                   ? ""
+                   : "<Points><DataArray type=\"UInt8\" NumberOfComponents=\"" + std::to_string(components) + "\"/></Points>") +
+              "</Piece>";
+    return Put("a.vtp", text + "</PolyData></VTKFile>");
+  };
+  EXPECT_NO_THROW(CheckVtkXmlFile(file(1, 50000, 3), "PolyData"));
+  for (const auto& [pieces, points, components] : {std::tuple(1, 50000, 300), {40, 50000, 0}}) {
+    const std::string path = file(pieces, points, components);
+    ExpectRefused([&] { CheckVtkXmlFile(path, "PolyData"); }, Error::Kind::BadFile, path, "more memory");
+  }
+}
+
+TEST_F(VtkXmlFile, ElementsThatAreNestedTooDeeplyAreRefused)
+{
+  std::string open, empty;
+  for (int i = 0; i < 200; ++i) {
+    open += "<a>";
+    empty += "<a b=\"\"c=\"\"/><a/><a></a>";
+  }
+  Refused("<Piece", open + "<Piece", "nested too deeply");
+  EXPECT_NO_THROW(CheckVtkXmlFile(File("<Piece", empty + "<Piece")));
 }
 
 TEST_F(VtkXmlFile, AppendedDataAreNamedByTheirElementAlone)
@@ -106,6 +144,10 @@ TEST_F(VtkXmlFile, AppendedDataAreNamedByTheirElementAlone)
   for (const char* before : {"<!-- <AppendedData -->", "<!--- <<AppendedData>-->", "<?a <AppendedData?>",
                              "<x y=\"<AppendedData\"/>", "<AppendedDataOfX/>", "<<AppendedData/>"})
     Refused("<Piece", before + std::string("<Piece"), "names appended data within");
+  // Of two, VTK takes the first, whatever it says.
+  Refused("</VTKFile>",
+          "<AppendedData type=\"Int8\" encoding=\"x\">_</AppendedData><AppendedData encoding=\"raw\">_</AppendedData></VTKFile>",
+          "encoding");
   EXPECT_NO_THROW(CheckVtkXmlFile(File("<Piece", "<!-- AppendedData <appendedData --><x y=\"AppendedData\"/><Piece")));
 }
 

@@ -9,7 +9,6 @@
 #include "Core/Base/TextFile.h"
 #include "Filters/Tissue/StlFile.h"
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <system_error>
@@ -305,27 +304,6 @@ SurfaceMapState StateOf(const SurfaceKeys& keys)
     for (Eigen::Index column = 0; column <= row; ++column)
       state.covariance(row, column) = state.covariance(column, row) = keys.covariance[at++];
   return state;
-}
-
-constexpr std::size_t StlHead = 84, StlTriangle = 50; // bytes: see StlFile.cxx
-
-std::string StlOf(const TriangleSurface& surface)
-{
-  std::string bytes(StlHead + StlTriangle * surface.triangles.size(), '\0');
-  std::strncpy(bytes.data(), "binary STL, mm", 80);
-  const auto count = static_cast<std::uint32_t>(surface.triangles.size());
-  std::memcpy(bytes.data() + 80, &count, 4);
-  char* at = bytes.data() + StlHead;
-  for (const auto& triangle : surface.triangles) {
-    const Eigen::Vector3f &a = surface.points[triangle[0]], &b = surface.points[triangle[1]], &c = surface.points[triangle[2]];
-    const Eigen::Vector3f cross = (b - a).cross(c - a);
-    const Eigen::Vector3f normal = cross.norm() > 0.0f ? Eigen::Vector3f(cross.normalized()) : Eigen::Vector3f::Zero();
-    const Eigen::Vector3f* parts[] = {&normal, &a, &b, &c};
-    for (std::size_t i = 0; i < 4; ++i)
-      std::memcpy(at + 12 * i, parts[i]->data(), 12);
-    at += StlTriangle;
-  }
-  return bytes;
 }
 
 } // namespace

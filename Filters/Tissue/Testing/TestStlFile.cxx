@@ -4,6 +4,7 @@
 #include "Testing/TemporaryFolder.h"
 #include <cmath>
 #include <cstring>
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 #include <limits>
 
@@ -63,15 +64,42 @@ TEST(StlFile, TextAndBinaryJoinPointsThatAreAlike)
 TEST(StlFile, WhatIsNoNumberIsKeptForTheCheckOfTheSurface)
 {
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  const TriangleSurface surface = SurfaceOfStl("a.stl", Binary({{nan, 0, 0}, {0, nan, 0}, {nan, 0, 0}}, 1));
-  EXPECT_EQ(surface.triangles, (Triangles{{0, 1, 0}}));
+  const TriangleSurface surface =
+      SurfaceOfStl("a.stl", Binary({{nan, 0, 0}, {0, nan, 0}, {1, 0, 0}, {nan, 0, 0}, {0, nan, 0}, {nan, 0, 0}}, 2));
+  EXPECT_EQ(surface.triangles, (Triangles{{0, 1, 2}})) << "the other has two corners alike";
   EXPECT_TRUE(std::isnan(surface.points[1].y()));
 }
 
-TEST(StlFile, BytesBehindTheTrianglesAreNotRead)
+TEST(StlFile, AllTrianglesThatAreThereAreReadWhateverTheirCount)
 {
-  EXPECT_EQ(SurfaceOfStl("a.stl", Binary(Square, 1)).triangles.size(), 1u);
-  EXPECT_EQ(SurfaceOfStl("a.stl", Binary(Square, 2) + "more").triangles.size(), 2u);
+  for (const char* name : {"binary", "solid a"})
+    for (const std::uint32_t count : {0u, 1u, 2u})
+      for (const char* behind : {"", "more"})
+        EXPECT_EQ(SurfaceOfStl("a.stl", Binary(Square, count, name) + behind).triangles.size(), 2u) << name << count << behind;
+  ExpectRefusal(Binary(Square, 3), "it has 2 triangles, and says 3");
+}
+
+TEST(StlFile, TextMayBeginWithBlanksAndHaveColours)
+{
+  std::string text = "\r\n  " + SquareText;
+  text.insert(text.find("endsolid"), "color 1 0 0\n");
+  EXPECT_EQ(SurfaceOfStl("a.stl", text).triangles.size(), 2u);
+}
+
+TEST(StlFile, WhatIsWrittenIsReadAgain)
+{
+  const TriangleSurface surface = SurfaceOfStl("a.stl", SquareText);
+  const std::string bytes = StlOf(surface);
+  const TriangleSurface again = SurfaceOfStl("a.stl", bytes);
+  EXPECT_EQ(again.points, surface.points);
+  EXPECT_EQ(again.triangles, surface.triangles);
+  const Eigen::Vector3f normal = (Square[1] - Square[0]).cross(Square[2] - Square[0]).normalized();
+  std::uint32_t word = 0; // of the first normal
+  for (std::size_t i = 0; i < 4; ++i)
+    word |= std::uint32_t{static_cast<unsigned char>(bytes[84 + 8 + i])} << 8 * i;
+  float z = 0.0f;
+  std::memcpy(&z, &word, 4);
+  EXPECT_FLOAT_EQ(z, normal.z());
 }
 
 TEST(StlFile, TruncatedAnywhereIsRefused)
@@ -85,12 +113,12 @@ TEST(StlFile, TruncatedAnywhereIsRefused)
 
 TEST(StlFile, DamagedIsRefusedWithTheReason)
 {
-  ExpectRefusal(Binary(Square, 0xFFFFFFFF), "its triangles take 214748364834");
+  ExpectRefusal(Binary(Square, 0xFFFFFFFF), "it has 2 triangles, and says 4294967295");
   ExpectRefusal(Text("vertex 0 0 0\nvertex 1 0 0\n"), "line 6: a facet that has 2 vertices");
   ExpectRefusal(Text("vertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nvertex 1 2 0\n"), "4 vertices");
   ExpectRefusal(Text("vertex 0 0 0\nvertex 1 0\nvertex 1 1 0\n"), "line 5: a vertex that is not three numbers");
   ExpectRefusal(Text("vertex 0 0 0\nvertex 1 0 0 0\nvertex 1 1 0\n"), "line 5");
   ExpectRefusal(Text("vertex 0 0 0\nvertex 1 0 0,5\nvertex 1 1 0\n"), "line 5");
-  ExpectRefusal(Text("vertex 0 0 0\nvortex 1 0 0\nvertex 1 1 0\n"), "\"vortex\" is no word of STL");
+  ExpectRefusal(Text("vertex 0 0 0\nvortex 1 0 0\nvertex 1 1 0\n"), "line 5: it does not begin with a word of STL");
   ExpectRefusal("solid a\nfacet\nvertex 0 0 0\nendsolid a\n", "ends within a solid");
 }
