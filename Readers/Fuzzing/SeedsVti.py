@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""SeedsVti.py DIR: small VTK image and polygon files of each encoding, whole and broken in one place, for the fuzzer to start from."""
+"""SeedsVti.py DIR: small VTK image files of each encoding, whole and broken in one place, for the fuzzer to start from."""
 import base64
 import struct
 import sys
@@ -39,25 +39,6 @@ def vti(form, word="I", block=0, encoding="base64", order="LittleEndian"):
        form.encode(), b' offset="0"' if form == "appended" else b"", inline, tail)
 
 
-def vtp(form, word="I", block=0):
-    arrays, appended = [], b""
-    for kind, name, components, numbers, code in (
-            ("Float32", "Points", 3, [0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0], "f"), ("Int64", "connectivity", 1, [0, 1, 2, 0, 2, 3], "q"),
-            ("Int64", "offsets", 1, [3, 6], "q"), ("Int32", "connectivity", 1, [3, 2, 1, 0], "i"), ("Int32", "offsets", 1, [4], "i")):
-        header, data = lengths(struct.pack(f"<{len(numbers)}{code}", *numbers), word, block)
-        coded = base64.b64encode(header) + base64.b64encode(data) if block else base64.b64encode(header + data)
-        inline = {"ascii": " ".join(map(str, numbers)).encode(), "binary": coded, "appended": b""}[form]
-        arrays.append(b'<DataArray type="%s" Name="%s" NumberOfComponents="%d" format="%s"%s>%s</DataArray>' % (
-            kind.encode(), name.encode(), components, form.encode(), b' offset="%d"' % len(appended) if form == "appended" else b"", inline))
-        appended += coded
-    return b"""<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="%s"%s>
-<PolyData><Piece NumberOfPoints="4" NumberOfVerts="0" NumberOfLines="0" NumberOfStrips="1" NumberOfPolys="2">
-<Points>%s</Points><Polys>%s%s</Polys><Strips>%s%s</Strips></Piece></PolyData>%s
-</VTKFile>
-""" % (b"UInt64" if word == "Q" else b"UInt32", b' compressor="vtkZLibDataCompressor"' if block else b"", *arrays,
-       b'<AppendedData encoding="base64">_%s</AppendedData>' % appended if form == "appended" else b"")
-
-
 seeds = {
     "ascii": vti("ascii"),
     "binary": vti("binary"),
@@ -73,7 +54,5 @@ seeds = {
     "wrongType": vti("binary").replace(b'"UInt8"', b'"Floatnan"'),
     "cut": vti("binary")[:-120],
 }
-seeds.update({"polygons": vtp("ascii"), "polygonsBinary": vtp("binary", "Q"), "polygonsBlocks": vtp("binary", "I", 16),
-              "polygonsAppended": vtp("appended")})
 for name, content in seeds.items():
     (folder / (name + ".vti")).write_bytes(content)

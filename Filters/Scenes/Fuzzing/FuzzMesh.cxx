@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Any bytes as a PLY, STL or glTF file, or, where they begin as none of these, as an OBJ file. No corner of what is accepted lies
-// beyond the points.
+// Any bytes as a PLY, STL, glTF or VTK file, or, where they begin as none of these, as an OBJ file. No corner of what is accepted
+// lies beyond the points. VTK's polygons are read with VTK, which is not ours.
 #include "Filters/Scenes/MeshFile.h"
+#include "Filters/Scenes/vtkUltrasoundVtpFile.h"
 #include "Filters/Tissue/StlFile.h"
+#include "Filters/Tissue/vtkUltrasoundTriangles.h"
 #include "Testing/Fuzzing.h"
+#include <sanitizer/lsan_interface.h>
 #include <string_view>
 
 using namespace echorama;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size)
 {
+  vtkObject::GlobalWarningDisplayOff();
   const MemoryFile file(data, size);
   return Survives([&] {
     const std::string_view content(reinterpret_cast<const char*>(data), size);
@@ -19,6 +23,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         for (const std::uint32_t corner : triangle)
           if (corner >= surface.points.size())
             std::abort(); // a finding
+      return;
+    }
+    if (content.substr(0, 8) == "<VTKFile") {
+      const __lsan::ScopedDisabler leaks; // of the array that VTK is reading when its data turn out to be damaged
+      TriangleSurface surface;
+      AddTriangles(surface, ReadVtp(file.Path()));
       return;
     }
     const bool isPly = content.substr(0, 3) == "ply", isGltf = content.substr(0, 4) == "glTF" || content.substr(0, 1) == "{";

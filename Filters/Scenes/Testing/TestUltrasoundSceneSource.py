@@ -182,7 +182,8 @@ class Scenes(unittest.TestCase):
             for old, new, words in (('NumberOfPoints="50"', 'NumberOfPoints="-2147483648"', "NumberOfPoints"),
                                     ('NumberOfPoints="50"', 'NumberOfPoints="40"', "points that are not there"),
                                     ('NumberOfPoints="50"', 'NumberOfPoints="0"', "points that are not there"),
-                                    ("          3 6 9 12", "          1 6 9 12", "fewer than three corners")):
+                                    ("          3 6 9 12", "          1 6 9 12", "fewer than three corners"),
+                                    (" 285 288", " 285 9000000000", "more corners than the file can hold")):
                 self.assertIn(old, whole)
                 path.write_text(whole.replace(old, new))
                 errors = self.errors_of(source(Scene=json.dumps({**SCENE, "tissue": [{"mesh": {"file": str(path), "material": "liver"}}]})))
