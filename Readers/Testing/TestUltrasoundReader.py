@@ -252,7 +252,7 @@ class Reader(unittest.TestCase):
         self.refused("a.vti", good[:150], "VTK file")
         self.refused("a.vti", good[:-80], "VTK file")
         self.refused("a.vti", vti(values="1 2 3"), "truncated or damaged")
-        self.refused("a.vti", vti(extent="0 100000 0 100000 0 100000"), "more voxels than the file can hold")
+        self.refused("a.vti", vti(extent="0 100000 0 100000 0 100000"), "more memory than the file justifies")
         self.refused("a.vti", vti(extent="0 2147483647 0 2147483647 0 2147483647"), "overflows")
         self.refused("a.vti", vti(extent="0 -1 0 1 0 1"), "WholeExtent")
         self.refused("a.vti", vti(spacing="1 0 1"), "spacing")
