@@ -135,7 +135,7 @@ TriangleSurface SurfaceOfStl(const std::string& path, std::string_view bytes)
     const Eigen::Vector3f point = corners[i].array() + 0.0f; // -0 is 0
     PointBits bits;
     std::memcpy(bits.data(), point.data(), sizeof bits);
-    const auto [found, isNew] = numbers.emplace(bits, static_cast<std::uint32_t>(surface.points.size()));
+    const auto [found, isNew] = numbers.try_emplace(bits, static_cast<std::uint32_t>(surface.points.size()));
     if (isNew)
       surface.points.push_back(corners[i]);
     triangle[i % 3] = found->second;
