@@ -2,7 +2,6 @@
 // Format: https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html. An array's data follow its element as text or
 // as base64, or lie behind AppendedData, as base64 or as they are. Binary data begin with a length, or, compressed, with the
 // number of their blocks, the bytes of a block and of the last one, and the compressed bytes of each.
-//
 // Only the elements and those lengths are read here. What lies between them is skipped: it is most of the file.
 #include "Readers/VtkXmlFile.h"
 #include "Core/Base/NumberText.h"
@@ -79,8 +78,10 @@ public:
         Piece(*element);
       } else if (name == "/Piece")
         isInPiece_ = false;
-      else if (name == "DataArray" || name == "Array" || element->Find("type")) // VTK reads arrays of any name
-        Array(*element);
+      else if (element->Find("type") || element->Find("Name") || element->Find("NumberOfTuples"))
+        Array(*element);                                // VTK reads arrays of any name
+      else if (name == "vtkQuadratureSchemeDefinition") // of an InformationKey; VTK believes all that it says
+        lines_.Fail("it cannot be read as a VTK file: it defines a " + name);
       else if (name == "/VTKFile")
         break; // what follows is not of it
     }
@@ -172,7 +173,6 @@ private:
     return element;
   }
 
-  // One of some words.
   void Need(const XmlElement& element, const std::string& key, std::initializer_list<const char*> words, bool mayBeMissing) const
   {
     const std::string* value = element.Find(key);
@@ -185,9 +185,7 @@ private:
                       std::int64_t missing) const
   {
     const std::string* value = element.Find(key);
-    if (!value)
-      return missing;
-    const std::int64_t number = lines_.Numbers<std::int64_t>(key, *value, 1)[0];
+    const std::int64_t number = value ? lines_.Numbers<std::int64_t>(key, *value, 1)[0] : missing;
     if (number < least || number > most)
       lines_.Fail(key + " of " + element.name + " is " + std::to_string(number) + ", which cannot be");
     return number;
@@ -262,6 +260,8 @@ private:
          {"Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Float32", "Float64", "String"}, false);
     Need(element, "format", {"ascii", "binary", "appended"}, true);
     const std::string& type = *element.Find("type");
+    if (type == "String" && isInPiece_ && type_ == "ImageData") // VTK ends where there are fewer than voxels
+      lines_.Fail("its voxels have texts, which are not read");
     const std::size_t digits = type.find_first_of("1368");
     const int bits = digits == std::string::npos ? 256 : std::stoi(type.substr(digits)); // a string has some
     const double bytes = bits / 8.0 * static_cast<double>(Number(element, "NumberOfComponents", 1, 1000000, 1));
@@ -269,12 +269,12 @@ private:
     tupleBytes_ = std::max(tupleBytes_, tupleBytesHere_);
     fieldBytes_ += bytes * static_cast<double>(Number(element, "NumberOfTuples", 0, std::int64_t{1} << 40, 0));
     const std::string* format = element.Find("format");
-    if (element.Find("offset") || (format && *format == "appended")) { // with an offset, VTK looks there whatever the format
-      if (!element.Find("offset"))
-        lines_.Fail(element.name + " has no offset of its appended data");
+    if (element.Find("offset")) { // VTK looks there whatever the format
       later_.insert(static_cast<std::uint64_t>(Number(element, "offset", 0, static_cast<std::int64_t>(bytes_), 0)));
       return;
     }
+    if (format && *format == "appended")
+      lines_.Fail(element.name + " has no offset of its appended data");
     for (const auto& [key, value] : element.attributes)
       if (value.find('>') != std::string::npos) // XML allows it
         lines_.Fail("the " + key + " of a " + element.name + " has a >, behind which VTK would look for the data");
@@ -312,7 +312,8 @@ private:
     }
     const std::vector<std::uint64_t> first = Words(begin, end, 3, isRaw);
     const std::uint64_t blocks = first[0], block = first[1], last = first[2];
-    if (blocks > room / wordBytes_ || (blocks > 0 && block == 0) || last > block || block > LargestRatio * bytes_)
+    if (blocks > room / wordBytes_ || (blocks > 0 && block == 0) || last > block ||
+        (blocks > (last > 0 ? 1 : 0) ? block : last) > LargestRatio * bytes_)
       fail();
     std::uint64_t sum = 0;
     const std::vector<std::uint64_t> all = Words(begin, end, 3 + blocks, isRaw);
@@ -364,10 +365,9 @@ private:
   HeaderLines lines_; // says what is wrong
   std::ifstream stream_;
   std::uint64_t bytes_;
-  bool isBigEndian_ = false, compressed_ = false, appended_ = false;
+  bool isBigEndian_ = false, compressed_ = false, appended_ = false, hasPiece_ = false, isInPiece_ = false;
   std::size_t wordBytes_ = 4;
-  std::vector<int> whole_; // extent
-  bool hasPiece_ = false, isInPiece_ = false;
+  std::vector<int> whole_;                         // extent
   double tuples_ = 0.0;                            // voxels, or points and cells of all pieces
   double tupleBytes_ = 0.0, tupleBytesHere_ = 0.0; // of all arrays, for a voxel: of the piece with most of them, of this one
   double fieldBytes_ = 0.0;                        // of what says its number of tuples, as arrays of no piece do

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// VTK's polygons (.vtp) from files that may be damaged. Not a class: for ReadMesh, and for its fuzzer.
+// VTK's polygons (.vtp) from files that may be damaged. Not a class of the module: for ReadMesh, and for its fuzzer.
 #ifndef vtkUltrasoundVtpFile_h
 #define vtkUltrasoundVtpFile_h
 

@@ -62,7 +62,7 @@ std::string_view Word(std::string_view& line)
   return word;
 }
 
-// Of one triangle after the other. All that are there: some programs write a wrong count, or none.
+// Of one triangle after the other. All that are there: some programs write too small a count, or none.
 std::vector<Eigen::Vector3f> CornersOfBinary(const std::string& path, std::string_view bytes)
 {
   const std::size_t there = bytes.size() < Head ? 0 : (bytes.size() - Head) / BytesOfTriangle;

@@ -86,6 +86,11 @@ TEST_F(VtkXmlFile, ElementsThatVtkWouldNotSurviveAreRefused)
   Refused("<ImageData", "<VTKFile type=\"ImageData\"/><ImageData", "or has two");
   Refused("<VTKFile", "<x/><VTKFile", "does not begin with a VTKFile");
   Refused("<Piece", "<Pieces", "no piece");
+  Refused("<Piece", "<FieldData><Foo NumberOfTuples=\"3\" Name=\"b\"/></FieldData><Piece", "Foo has no type");
+  Refused("<Piece", "<FieldData><Foo Name=\"b\"/></FieldData><Piece", "Foo has no type");
+  Refused("<PointData>", "<PointData><DataArray type=\"String\" Name=\"s\" format=\"ascii\">65 0</DataArray>",
+          "voxels have texts");
+  Refused("<Piece", "<InformationKey><vtkQuadratureSchemeDefinition/></InformationKey><Piece", "vtkQuadratureSchemeDefinition");
   Refused("<Piece", "<?a \"?><DataArray type=\"x\"/><?b \"?><Piece", "\"x\"");       // not within quotes
   Refused("<Piece", "<?a ><!-- ?><DataArray type=\"x\"/><?b --> ?><Piece", "\"x\""); // nor in a comment
 }
@@ -111,10 +116,10 @@ TEST_F(VtkXmlFile, ArraysThatAskForMoreThanTheFileCanHoldAreRefused)
 
 TEST_F(VtkXmlFile, PolygonsThatAskForMoreThanTheFileCanHoldAreRefused)
 {
-  const auto file = [&](int pieces, int points, int components) {
+  const auto file = [&](int pieces, int points, int components, const std::string& count = "NumberOfPoints") {
     std::string text = "<VTKFile type=\"PolyData\"><PolyData>";
     for (int i = 0; i < pieces; ++i)
-      text += "<Piece NumberOfPoints=\"" + std::to_string(points) + "\">" +
+      text += "<Piece " + count + "=\"" + std::to_string(points) + "\">" +
               (components == 0
                    ? ""
                    : "<Points><DataArray type=\"UInt8\" NumberOfComponents=\"" + std::to_string(components) + "\"/></Points>") +
@@ -122,8 +127,13 @@ TEST_F(VtkXmlFile, PolygonsThatAskForMoreThanTheFileCanHoldAreRefused)
     return Put("a.vtp", text + "</PolyData></VTKFile>");
   };
   EXPECT_NO_THROW(CheckVtkXmlFile(file(1, 50000, 3), "PolyData"));
-  for (const auto& [pieces, points, components] : {std::tuple(1, 50000, 300), {40, 50000, 0}}) {
-    const std::string path = file(pieces, points, components);
+  for (const auto& [pieces, points, components, count] : {std::tuple(1, 50000, 300, "NumberOfPoints"),
+                                                          {40, 50000, 0, "NumberOfPoints"},
+                                                          {40, 50000, 0, "NumberOfPolys"},
+                                                          {40, 50000, 0, "NumberOfStrips"},
+                                                          {40, 50000, 0, "NumberOfLines"},
+                                                          {40, 50000, 0, "NumberOfVerts"}}) {
+    const std::string path = file(pieces, points, components, count);
     ExpectRefused([&] { CheckVtkXmlFile(path, "PolyData"); }, Error::Kind::BadFile, path, "more memory");
   }
 }
@@ -160,6 +170,7 @@ TEST_F(VtkXmlFile, LengthsInFrontOfDataAreChecked)
   for (const char* format : {"", "format=\"ascii\" ", "format=\"binary\" "}) // VTK goes by the offset alone
     Refused("format=\"binary\"", format + std::string("offset=\"0\""), "appended, and there are none");
   Blocks("AQAAAAgAAAAAAAAACAAAAA==", "");       // one block of 8 bytes, none of them in a last one, 8 compressed
+  Blocks("AQAAAAAAAEAEAAAACAAAAA==", "");       // blocks of a gigabyte, of which there is only a last one, of 4 bytes
   Blocks("AQAAAAAAAAAAAAAACAAAAA==", "length"); // blocks of no bytes
   Blocks("AQAAAAgAAAAAAAAA////fw==", "length"); // more compressed bytes than the file has
   Blocks("AQAAAAgAAAAJAAAACAAAAA==", "length"); // the last is larger than the others
