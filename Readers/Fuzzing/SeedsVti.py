@@ -3,27 +3,20 @@
 import base64
 import struct
 import sys
-import zlib
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "Testing"))
+from vtk_xml import coded, lengths  # noqa: E402
 
 folder = Path(sys.argv[1])
 voxels = bytes(range(60))
 
 
-def lengths(data, word, block):
-    """The data as VTK writes them: behind their length, or in compressed blocks behind the lengths of those."""
-    if not block:
-        return struct.pack("<" + word, len(data)), data
-    blocks = [zlib.compress(data[i:i + block]) for i in range(0, len(data), block)]
-    sizes = [len(blocks), block, len(data) % block, *map(len, blocks)]
-    return struct.pack(f"<{len(sizes)}{word}", *sizes), b"".join(blocks)
-
-
 def vti(form, word="I", block=0, encoding="base64", order="LittleEndian"):
     header, data = lengths(voxels, word, block)
-    coded = base64.b64encode(header) + base64.b64encode(data) if block else base64.b64encode(header + data)
-    inline = {"ascii": b" ".join(b"%d" % v for v in voxels), "binary": coded, "appended": b""}[form]
-    raw = header + data if encoding == "raw" else coded
+    text = coded(voxels, word, block)
+    inline = {"ascii": b" ".join(b"%d" % v for v in voxels), "binary": text, "appended": b""}[form]
+    raw = header + data if encoding == "raw" else text
     tail = b'<AppendedData encoding="%s">_%s</AppendedData>' % (encoding.encode(), raw) if form == "appended" else b""
     return b"""<?xml version="1.0"?>
 <VTKFile type="ImageData" version="1.0" byte_order="%s" header_type="%s"%s>

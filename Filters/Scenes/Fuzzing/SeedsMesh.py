@@ -3,8 +3,10 @@
 import base64
 import struct
 import sys
-import zlib
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "Testing"))
+from vtk_xml import coded  # noqa: E402
 
 folder = Path(sys.argv[1])
 
@@ -59,26 +61,16 @@ seeds.update({
 })
 
 
-def lengths(data, word, block):
-    """The data as VTK writes them: behind their length, or in compressed blocks behind the lengths of those."""
-    if not block:
-        return struct.pack("<" + word, len(data)), data
-    blocks = [zlib.compress(data[i:i + block]) for i in range(0, len(data), block)]
-    sizes = [len(blocks), block, len(data) % block, *map(len, blocks)]
-    return struct.pack(f"<{len(sizes)}{word}", *sizes), b"".join(blocks)
-
-
 def vtp(form, word="I", block=0):
     arrays, appended = [], b""
     for kind, name, components, numbers, code in (
             ("Float32", "Points", 3, [0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0], "f"), ("Int64", "connectivity", 1, [0, 1, 2, 0, 2, 3], "q"),
             ("Int64", "offsets", 1, [3, 6], "q"), ("Int32", "connectivity", 1, [3, 2, 1, 0], "i"), ("Int32", "offsets", 1, [4], "i")):
-        header, data = lengths(struct.pack(f"<{len(numbers)}{code}", *numbers), word, block)
-        coded = base64.b64encode(header) + base64.b64encode(data) if block else base64.b64encode(header + data)
-        inline = {"ascii": " ".join(map(str, numbers)).encode(), "binary": coded, "appended": b""}[form]
+        data = coded(struct.pack(f"<{len(numbers)}{code}", *numbers), word, block)
+        inline = {"ascii": " ".join(map(str, numbers)).encode(), "binary": data, "appended": b""}[form]
         arrays.append(b'<DataArray type="%s" Name="%s" NumberOfComponents="%d" format="%s"%s>%s</DataArray>' % (
             kind.encode(), name.encode(), components, form.encode(), b' offset="%d"' % len(appended) if form == "appended" else b"", inline))
-        appended += coded
+        appended += data
     return b"""<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="%s"%s>
 <PolyData><Piece NumberOfPoints="4" NumberOfVerts="0" NumberOfLines="0" NumberOfStrips="1" NumberOfPolys="2">
 <Points>%s</Points><Polys>%s%s</Polys><Strips>%s%s</Strips></Piece></PolyData>%s
