@@ -78,10 +78,10 @@ public:
         Piece(*element);
       } else if (name == "/Piece")
         isInPiece_ = false;
-      else if (element->Find("type") || element->Find("Name") || element->Find("NumberOfTuples"))
-        Array(*element);                                // VTK reads arrays of any name
       else if (name == "vtkQuadratureSchemeDefinition") // of an InformationKey; VTK believes all that it says
         lines_.Fail("it cannot be read as a VTK file: it defines a " + name);
+      else if (element->Find("type") || element->Find("Name") || element->Find("NumberOfTuples"))
+        Array(*element); // VTK reads arrays of any name
       else if (name == "/VTKFile")
         break; // what follows is not of it
     }

@@ -91,6 +91,7 @@ TEST_F(VtkXmlFile, ElementsThatVtkWouldNotSurviveAreRefused)
   Refused("<PointData>", "<PointData><DataArray type=\"String\" Name=\"s\" format=\"ascii\">65 0</DataArray>",
           "voxels have texts");
   Refused("<Piece", "<InformationKey><vtkQuadratureSchemeDefinition/></InformationKey><Piece", "vtkQuadratureSchemeDefinition");
+  Refused("<Piece", "<vtkQuadratureSchemeDefinition type=\"Int8\"/><Piece", "it defines a vtkQuadratureSchemeDefinition");
   Refused("<Piece", "<?a \"?><DataArray type=\"x\"/><?b \"?><Piece", "\"x\"");       // not within quotes
   Refused("<Piece", "<?a ><!-- ?><DataArray type=\"x\"/><?b --> ?><Piece", "\"x\""); // nor in a comment
 }
