@@ -77,6 +77,14 @@ class Reports(unittest.TestCase):
         with self.assertRaises(SystemExit):
             compare_benchmarks.table({"v2": lines, "v3": lines[:1]})
 
+    def test_the_fastest_run_of_each_row_counts(self):
+        def run(*seconds):
+            return [{"case": f"row {row}", "method": "ours", "seconds": value} for row, value in enumerate(seconds)]
+        columns = compare_benchmarks.fastest([("v2", run(3.0, 5.0)), ("v4", run(2.0, 2.0)), ("v2", run(4.0, 4.0)), ("v4", run(1.0, 3.0))])
+        self.assertEqual(columns, {"v2": run(3.0, 4.0), "v4": run(1.0, 2.0)})
+        with self.assertRaises(SystemExit):
+            compare_benchmarks.fastest([("v2", run(3.0, 5.0)), ("v2", run(3.0))])
+
     def test_kernels_of_packages_beside_those_for_this_machine(self):
         times = ((9.0, 9.0, 9.0, 9.0), (3.0, 2.1, 9.0, 1.0), (2.0, 2.0, 10.0, 0.0))
         columns = [[{"case": f"row {row}", "method": "ours", "seconds": value} for row, value in enumerate(seconds)] for seconds in times]
