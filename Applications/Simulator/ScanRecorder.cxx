@@ -2,10 +2,10 @@
 #include "ScanRecorder.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/FileReplacement.h"
-#include "Readers/SequenceRecorder.h"
 #include "Readers/SequenceText.h"
 #include "Readers/SequenceWriter.h"
 #include "Scan.h"
+#include "Tracking/Stream/SequenceRecorder.h"
 #include "Widgets/Session/ProjectFile.h"
 #include <algorithm>
 #include <QDateTime>

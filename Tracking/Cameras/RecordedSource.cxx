@@ -2,8 +2,8 @@
 #include "Tracking/Cameras/RecordedSource.h"
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
-#include "Readers/SequenceRecorder.h"
 #include "Tracking/Cameras/RestUntil.h"
+#include "Tracking/Stream/SequenceRecorder.h"
 #include <cmath>
 #include <cstring>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-#include "Readers/SequenceRecorder.h"
 #include "Tracking/Stream/PoseStream.h"
+#include "Tracking/Stream/SequenceRecorder.h"
 #include <cstdint>
 #include <memory>
 #include <string>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
 #include "Core/Base/FormatText.h"
-#include "Readers/SequenceRecorder.h"
 #include "Testing/TemporaryFolder.h"
 #include "Tracking/Devices/FusedTracker.h"
 #include "Tracking/Devices/SimulatedTracker.h"
 #include "Tracking/Stream/Clock.h"
+#include "Tracking/Stream/SequenceRecorder.h"
 #include "Tracking/Testing/SurfaceSimulation.h"
 #include <functional>
 

@@ -3,8 +3,8 @@
 #include "Core/Base/Angles.h"
 #include "Core/Base/Random.h"
 #include "ProbeTracker.h"
-#include "Readers/SequenceRecorder.h"
 #include "SimulatorUnderTest.h"
+#include "Tracking/Stream/SequenceRecorder.h"
 #include <atomic>
 #include <memory>
 #include <QDockWidget>

@@ -6,10 +6,10 @@
 #include "NeedleTool.h"
 #include "OutputPanel.h"
 #include "Readers/SequenceFile.h"
-#include "Readers/SequenceRecorder.h"
 #include "ScanLog.h"
 #include "SimulatorUnderTest.h"
 #include "TaskPanel.h"
+#include "Tracking/Stream/SequenceRecorder.h"
 #include "Widgets/Session/LiveScore.h"
 #include <QCheckBox>
 #include <QComboBox>

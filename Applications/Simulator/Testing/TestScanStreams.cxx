@@ -4,9 +4,9 @@
 #include "JobBar.h"
 #include "NeedleTool.h"
 #include "OutputPanel.h"
-#include "Readers/SequenceRecorder.h"
 #include "ScanLog.h"
 #include "SimulatorUnderTest.h"
+#include "Tracking/Stream/SequenceRecorder.h"
 #include "VolumeReading.h"
 #include <atomic>
 #include <QCheckBox>

@@ -8,7 +8,7 @@
 //
 // Pixels are appended to a file of their own before the header counts their frame; what a kill leaves there beyond the frames of
 // the header is passed over by readers, and known to ours by the field Recorder.
-#include "Readers/SequenceRecorder.h"
+#include "Tracking/Stream/SequenceRecorder.h"
 #include "Core/Base/ElapsedTime.h"
 #include "Core/Base/Error.h"
 #include "Readers/HeaderLines.h"

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A recorder is killed, and its disk is full, at every sort of moment: the file must open each time, with what was safe.
 #include "Core/Base/Random.h"
-#include "Readers/SequenceRecorder.h"
 #include "Readers/SequenceWriter.h"
 #include "Testing/TemporaryFolder.h"
+#include "Tracking/Stream/SequenceRecorder.h"
 #include <chrono>
 #include <cmath>
 #include <cstring>
