@@ -208,8 +208,8 @@ private:
   bool Next(bool comments = false)
   {
     while (lines_.Next(line_)) {
-      if (++number_ == 1 && line_.compare(0, 3, "\xef\xbb\xbf") == 0) // a byte order mark
-        line_.erase(0, 3);
+      if (++number_ == 1)
+        line_ = SkipByteOrderMark(line_);
       const std::string_view text = TrimBlanks(line_);
       if (!text.empty() && (comments || text[0] != '#'))
         return true;

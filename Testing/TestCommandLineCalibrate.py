@@ -260,6 +260,10 @@ class HandEye(unittest.TestCase):
             self.assertEqual(done.returncode, 2, option)
             self.assertIn("--tracker", done.stderr)
         table = work / "balls.csv"
+        table.write_text("\ufefflabel,x,y,z,radius\nA,1,2,3,wide\n", encoding="utf-8")  # as spreadsheets write it
+        done = run("calibrate", "hand-eye", "--volumes", *volumes, "--tracker", log, "--rig", table, "-o", work / "refused.json")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn('line 2: "wide" is no number for radius', done.stderr)
         table.write_text("label,x,y,z,radius\n")
         done = run("calibrate", "hand-eye", "--volumes", *volumes, "--tracker", log, "--rig", table, "-o", table)
         self.assertEqual(done.returncode, 1)

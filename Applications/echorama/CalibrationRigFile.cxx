@@ -4,6 +4,7 @@
 #include "Core/Base/Error.h"
 #include "Core/Base/NumberText.h"
 #include "Core/Base/TextFile.h"
+#include "Core/Base/Words.h"
 #include "Filters/Phantoms/CalibrationRig.h"
 #include <algorithm>
 #include <sstream>
@@ -22,7 +23,7 @@ std::vector<RigBall> RigBallsOf(const std::string& rig)
       balls.push_back({ball.name, scale * ball.centre, scale * ball.radius});
     return balls;
   }
-  std::istringstream lines(ReadTextFile(rig, 1 << 20));
+  std::istringstream lines(std::string(SkipByteOrderMark(ReadTextFile(rig, 1 << 20))));
   const std::vector<std::string> wanted = {"label", "x", "y", "z", "radius"};
   std::vector<std::size_t> columns;
   int number = 0;

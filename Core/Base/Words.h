@@ -15,6 +15,12 @@ inline std::string_view TrimBlanks(std::string_view text)
   return first == std::string_view::npos ? std::string_view() : text.substr(first, text.find_last_not_of(Blanks) - first + 1);
 }
 
+/// \a text without the byte-order mark of UTF-8 that spreadsheets and editors may begin a file with.
+inline std::string_view SkipByteOrderMark(std::string_view text)
+{
+  return text.substr(text.substr(0, 3) == "\xef\xbb\xbf" ? 3 : 0);
+}
+
 /// What blanks separate in \a text.
 inline std::vector<std::string_view> SplitWords(std::string_view text)
 {

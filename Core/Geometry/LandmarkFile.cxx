@@ -219,12 +219,9 @@ std::vector<Landmark> ReadLandmarks(const std::string& path)
 {
   const JsonPlace file(path);
   const std::string whole = ReadTextFile(path, std::size_t{256} << 20);
-  std::string_view text = whole;
-  if (text.substr(0, 3) == "\xef\xbb\xbf") // a byte order mark
-    text.remove_prefix(3);
-  const std::size_t first = text.find_first_not_of(" \t\r\n");
-  std::vector<Landmark> landmarks =
-      first != std::string_view::npos && text[first] == '{' ? JsonLandmarks(text, file) : TableLandmarks(text, file);
+  const std::string_view text = SkipByteOrderMark(whole);
+  const std::string_view first = text.substr(std::min(text.find_first_not_of(" \t\r\n"), text.size()), 1);
+  std::vector<Landmark> landmarks = first == "{" ? JsonLandmarks(text, file) : TableLandmarks(text, file);
   if (landmarks.empty())
     file.Fail("it holds no landmarks");
   return landmarks;

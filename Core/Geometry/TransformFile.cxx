@@ -15,13 +15,11 @@ namespace {
 constexpr const char* Schema = "echorama-transforms-1";
 using Json = JsonPlace::Json;
 
-// Without a byte order mark and the blanks before the first character.
+// From the first character that is no blank.
 std::string_view Begin(std::string_view text)
 {
-  if (text.substr(0, 3) == "\xef\xbb\xbf")
-    text.remove_prefix(3);
-  const std::size_t first = text.find_first_not_of(" \t\r\n");
-  return first == std::string_view::npos ? std::string_view() : text.substr(first);
+  text = SkipByteOrderMark(text);
+  return text.substr(std::min(text.find_first_not_of(" \t\r\n"), text.size()));
 }
 
 void SetMatrix(NamedTransform& transform, const Eigen::Matrix4d& matrix, const JsonPlace& place)
@@ -163,9 +161,7 @@ std::vector<NamedTransform> ReadTransforms(const std::string& path, const CycleT
 
 std::string ReadTransformReport(const std::string& path)
 {
-  const Json root = Json::parse(ReadTextFile(path), nullptr, false);
-  if (root.is_discarded())
-    throw Error(Error::Kind::BadFile, path + ": it is not JSON");
+  const Json root = JsonPlace(path).Parse(ReadTextFile(path));
   return root.is_object() && root.contains("report") ? root["report"].dump() : "";
 }
 

@@ -35,15 +35,22 @@ std::uint32_t Word(const char* bytes)
 // Up to the first that is no digit of it.
 std::string FromBase64(std::string_view text)
 {
-  constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  constexpr auto digitOf = [] { // 64: none
+    constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    std::array<unsigned char, 256> values{};
+    for (std::size_t c = 0; c < values.size(); ++c)
+      values[c] = static_cast<unsigned char>(std::min(digits.find(static_cast<char>(c)), digits.size()));
+    return values;
+  }();
   std::string bytes;
+  bytes.reserve(text.size() / 4 * 3 + 3);
   std::uint32_t bits = 0;
   int held = 0;
   for (const char c : text) {
-    const std::size_t digit = digits.find(c);
-    if (digit == std::string_view::npos)
+    const std::uint32_t digit = digitOf[static_cast<unsigned char>(c)];
+    if (digit > 63)
       break;
-    bits = bits << 6 | static_cast<std::uint32_t>(digit);
+    bits = bits << 6 | digit;
     held += 6;
     if (held >= 8) {
       held -= 8;

@@ -230,7 +230,7 @@ PolygonMesh ReadPly(const std::string& path)
 PolygonMesh ReadObj(const std::string& path)
 {
   const std::string content = ReadMeshContent(path);
-  std::string_view rest = content;
+  std::string_view rest = SkipByteOrderMark(content);
   std::size_t number = 0;
   const auto fail = [&](const std::string& what) { FailFile(path, "line " + std::to_string(number) + ": " + what); };
   const auto next = [&] { // without a comment

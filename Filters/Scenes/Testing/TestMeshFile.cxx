@@ -138,6 +138,8 @@ TEST_F(MeshFile, ObjCountsFromOneAndBackFromTheLast)
   const std::string vertices =
       "# a\r\nmtllib x.mtl\nv 0 0 0\r\nv 1 0 0.5 # b\nv 1 -1 0 1.0 0.5\n  v\t0 1 0\nv 0 0 +1e3\nvt 0 0\nvn 0 0 1\n";
   ExpectGood(ReadObj(Put("a.obj", vertices + "f 1 2 3 4\nf 1 2\nf 1 3 5")));
+  const std::string marked = "\xef\xbb\xbf" + vertices.substr(vertices.find("v 0")); // byte-order mark
+  ExpectGood(ReadObj(Put("a.obj", marked + "f 1 2 3 4\nf 1 2\nf 1 3 5")));
   ExpectGood(ReadObj(Put("a.obj", vertices + "f -5/1 -4//1 3/1/1 \\\r\n 4\nl 1 2\ng x\nf -5 -3 -1\n")));
 }
 
