@@ -129,7 +129,7 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
     inputs.insert(inputs.end(), files.begin(), files.end());
   if (!options.poses.empty())
     inputs.push_back(options.poses);
-  const bool isDefault = options.output.empty();
+  bool isDefault = options.output.empty();
   if (isDefault) {
     options.output = DefaultOutput;
     if (!aligner->GetDryRun() && std::filesystem::exists(options.output))
@@ -200,11 +200,8 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
     TellPlan(session, volumes.size(), aligner->Plan());
     return;
   }
-  if (isDefault)
-    KeepWhatCameMeanwhile(session, options.output);
 
   nlohmann::ordered_json report = ToJson(aligner->Result(), 1); // from 1, as --fixed counts
-  session.result["output"] = options.output;
   session.result["fixed"] = options.fixed;
   session.result["volumes"] = nlohmann::ordered_json::array();
   std::vector<VolumePose> poses;
@@ -240,8 +237,15 @@ void Align(Session& session, AlignOptions options, vtkUltrasoundAligner* aligner
     session.Note("not every volume is aligned: check the poses before using them");
   }
 
+  const auto output = [&] {
+    if (isDefault)
+      KeepWhatCameMeanwhile(session, options.output);
+    isDefault = false; // once: displacements are named after it
+    return options.output;
+  };
   if (options.deformable)
-    DeformVolumes(session, deformer, volumes, isPlaced, options.fixed - 1, options.output, files, poses);
+    DeformVolumes(session, deformer, volumes, isPlaced, options.fixed - 1, output, files, poses);
+  session.result["output"] = output();
   if (!landmarks.empty()) {
     for (std::size_t i = 0; i < volumes.size(); ++i) {
       landmarks[i].volumeToWorld = volumes[i].volumeToWorld;

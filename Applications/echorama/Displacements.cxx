@@ -63,8 +63,8 @@ std::string DisplacementPath(const std::string& poses, std::size_t number)
 }
 
 void DeformVolumes(Session& session, vtkUltrasoundDeformableAligner* aligner, const std::vector<LoadedVolume>& volumes,
-                   const std::vector<bool>& aligned, int fixed, const std::string& output, FileReplacement& files,
-                   std::vector<VolumePose>& poses)
+                   const std::vector<bool>& aligned, int fixed, const std::function<std::string()>& output,
+                   FileReplacement& files, std::vector<VolumePose>& poses)
 {
   std::vector<LoadedVolume> placed;
   std::vector<std::size_t> numbers;
@@ -81,6 +81,7 @@ void DeformVolumes(Session& session, vtkUltrasoundDeformableAligner* aligner, co
     return;
   aligner->SetInputDataObject(BlocksOf(placed));
   session.Update(aligner, "deform");
+  const std::string posesFile = output();
   for (std::size_t p = 0; p < placed.size(); ++p) {
     const auto block = static_cast<unsigned int>(p);
     const std::size_t number = numbers[p];
@@ -95,7 +96,7 @@ void DeformVolumes(Session& session, vtkUltrasoundDeformableAligner* aligner, co
                                 {"smallest_determinant", found.smallestDeterminant},
                                 {"bending_mm", found.bendingEnergy}};
     if (found.isApplied) {
-      const std::string place = DisplacementPath(output, number);
+      const std::string place = DisplacementPath(posesFile, number);
       poses[number].displacement = session.Stage(files, place);
       WriteDisplacement(
           vtkImageData::SafeDownCast(vtkMultiBlockDataSet::SafeDownCast(aligner->GetOutputDataObject(1))->GetBlock(block)),

@@ -3,6 +3,7 @@
 #include "Core/Base/FileReplacement.h"
 #include "Core/Imaging/DisplacementField.h"
 #include "Volumes.h"
+#include <functional>
 #include <optional>
 
 class vtkUltrasoundDeformableAligner;
@@ -19,10 +20,10 @@ std::optional<DisplacementField> DisplacementOf(Session&, const VolumePose&);
 void WriteDisplacement(vtkImageData* image, const std::string& path);
 
 /// Finds what the poses of those volumes leave over that have an \a aligned beside them, and stages it in \a files for the pose
-/// file \a output: until they are committed, each pose names the staged one. Tells what was found, as "deformation" in the
-/// results of each volume. \param fixed the volume (from 0) that is not bent
+/// file that \a output names, which is called after all that takes long: until they are committed, each pose names the staged
+/// one. Tells what was found, as "deformation" in the results of each volume. \param fixed the volume (from 0) that is not bent
 void DeformVolumes(Session&, vtkUltrasoundDeformableAligner*, const std::vector<LoadedVolume>&, const std::vector<bool>& aligned,
-                   int fixed, const std::string& output, FileReplacement& files, std::vector<VolumePose>& poses);
+                   int fixed, const std::function<std::string()>& output, FileReplacement& files, std::vector<VolumePose>& poses);
 
 /// The displacements that the pose file \a path names for volumes that it has placed, as blocks in their order, zero for those
 /// without; nothing when it names none. Throws Error that names the file.
