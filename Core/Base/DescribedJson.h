@@ -13,6 +13,7 @@
 // more to it derives from them, as scenes do (Filters/Scenes). A heavy header, to be named in .cxx files only.
 #include "Core/Base/Error.h"
 #include "Core/Base/JoinedText.h"
+#include "Core/Base/JsonPlace.h"
 #include "Core/Base/ParameterJson.h"
 #include <algorithm>
 #include <cmath>
@@ -51,12 +52,10 @@ using Json = nlohmann::ordered_json;
 inline constexpr std::size_t longestText = 4096, longestList = 100000;
 inline constexpr std::uint64_t largestSeed = 9223372036854775807u; // VTK's seeds have a sign
 
-/// As JSON, and shortened.
-std::string Shown(const Json& value);
-
-/// The whole of \a text, which messages call \a name. \throws Error(BadFile) for what is no JSON, for a key that is there twice,
-/// and for nesting of more than 32 levels, which would be an attack on the stack
-Json Parse(const std::string& name, const std::string& text);
+inline std::string Shown(const Json& value)
+{
+  return JsonPlace::Shown(value);
+}
 
 /// One object of a text, key by key. \a Derived says how structs are checked beyond their ranges, Validate(value), and what they
 /// have from what was read before, Inherit(context, value). Every failure is Error(BadFile) with the way to the key.

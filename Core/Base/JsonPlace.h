@@ -18,8 +18,11 @@ public:
   JsonPlace In(const std::string& part) const { return JsonPlace(name_ + ", " + part); }
   [[noreturn]] void Fail(const std::string& reason) const { throw Error(Error::Kind::BadFile, name_ + ": " + reason); }
 
-  /// The whole \a text as JSON, of at most 32 levels: deeper nesting is an attack on the stack.
+  /// The whole \a text as JSON. Refused are a key that is there twice in an object, of which the last would count, and what is an
+  /// attack: more than 32 levels on the stack, more than 4,096 keys of an object on the time.
   Json Parse(std::string_view text) const;
+  /// \a value as text, shortened.
+  static std::string Shown(const Json& value);
   const Json& Member(const Json& object, const char* key) const;
   double Number(const Json& value) const;
   std::string Text(const Json& value) const;

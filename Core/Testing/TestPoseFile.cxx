@@ -192,6 +192,12 @@ TEST_F(PoseFile, RefusesWhatIsNotAPoseFile)
   ExpectRefused(std::string(1000000, '['), "nested");
   ExpectRefused(Document(std::string(100, '[') + std::string(100, ']')), "nested");
   ExpectRefused("[1,2]", "schema");
+  ExpectRefused(Document(good, R"("schema":"echorama-poses-1","unit":"mm","unit":"mm","frame":"LPS")"),
+                "\"unit\" is there twice");
+  std::string many = R"({"file":"a.mha")";
+  for (int i = 0; i < 5000; ++i)
+    many += ",\"" + std::to_string(i) + "\":0";
+  ExpectRefused(Document(many + "}"), "more than 4096 keys");
   ExpectRefused(Document(good, R"("schema":"echorama-poses-2","unit":"mm","frame":"LPS")"), "schema");
   ExpectRefused(Document(good, R"("schema":"echorama-poses-1","unit":"cm","frame":"LPS")"), "unit");
   ExpectRefused(Document(good, R"("schema":"echorama-poses-1","unit":"mm","frame":"RAS")"), "frame");

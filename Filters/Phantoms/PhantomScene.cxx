@@ -181,7 +181,7 @@ std::string PhantomToJson(const PhantomScene& scene)
 PhantomScene PhantomFromJson(const std::string& text)
 {
   const std::string name = "phantom scene";
-  const Json whole = described::Parse(name, text);
+  const Json whole = JsonPlace(name).Parse(text);
   // What describes a phantom says more than its bodies.
   Json bodies = Json::object();
   for (const char* key : {"schema", "inclusions"})

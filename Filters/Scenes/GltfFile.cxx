@@ -20,6 +20,7 @@ namespace echorama {
 namespace {
 
 constexpr std::size_t LargestRatio = 16; // of points and corners to the bytes of the files
+constexpr std::size_t LongestUri = 4096; // of a file: each accessor looks at it
 
 // Extensions that change no triangle begin with these.
 constexpr std::array<std::string_view, 4> Harmless{"KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_"};
@@ -218,8 +219,8 @@ private:
       place_.Fail("the uri of a buffer is no text");
     const auto& uri = buffer["uri"].get_ref<const std::string&>(); // not a copy for each accessor: it may hold all the data
     const bool isData = uri.compare(0, 5, "data:") == 0;
-    if (!isData && uri.find(':') != std::string::npos)
-      place_.Fail("its data lie at " + uri + ", which is no file beside it");
+    if (!isData && (uri.size() > LongestUri || uri.find(':') != std::string::npos))
+      place_.Fail("its data lie at " + JsonPlace::Shown(uri) + ", which is no file beside it");
     const std::string file = isData ? "data:" + std::to_string(index)
                                     : (std::filesystem::path(path_).parent_path() / FromUri(uri)).lexically_normal().string();
     const auto [found, isNew] = buffers_.try_emplace(file);

@@ -240,7 +240,7 @@ private:
 SynthesisScene SceneFromJson(const std::string& text, const std::string& name, const std::optional<std::uint64_t>& seed)
 {
   SynthesisScene scene;
-  auto json = described::Parse(name, text);
+  auto json = JsonPlace(name).Parse(text);
   if (json.is_object())
     json.erase("$schema"); // a hint for editors
   if (seed && json.is_object())

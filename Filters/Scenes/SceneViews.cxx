@@ -66,7 +66,7 @@ void Follow(const ScenePath& path, const Eigen::AlignedBox3d& head, double stepM
 {
   constexpr double shortest = 1e-3; // s
   const double middle = 0.5 * (from.time + to.time);
-  if (to.time - from.time > shortest) {
+  if (to.time - from.time > shortest && from.time < middle && middle < to.time) { // large times have nothing in between
     const TimedPose between{middle, path.At(middle)};
     // A probe that goes there and back is far off in the middle.
     if (WayOf(head, from.pose, to.pose) > stepMm || WayOf(head, from.pose, between.pose) > stepMm) {

@@ -134,13 +134,15 @@ Pose SceneSweep::ProbeToWorldAt(const Pose& middle, double secondsFromMiddle) co
 
 const Material& SynthesisScene::MaterialOf(const std::string& wanted) const
 {
-  std::string names;
-  for (const std::vector<Material>* list : {&materials, &StandardMaterials()})
-    for (const Material& material : *list) {
+  const auto lists = {&materials, &StandardMaterials()};
+  for (const std::vector<Material>* list : lists)
+    for (const Material& material : *list)
       if (material.name == wanted)
         return material;
+  std::string names;
+  for (const std::vector<Material>* list : lists)
+    for (const Material& material : *list)
       names += (names.empty() ? "" : ", ") + material.name;
-    }
   throw Error(Error::Kind::InvalidParameter, "there is no material " + described::Shown(wanted) + "; there are " + names);
 }
 

@@ -373,7 +373,7 @@ CalibratedSurface ReadSurface(const std::string& path)
 {
   SurfaceKeys keys;
   NoSurfaceContext none;
-  const Json json = described::Parse(path, ReadTextFile(path));
+  const Json json = JsonPlace(path).Parse(ReadTextFile(path));
   SurfaceReader::Read(path, none, json, "", keys);
   const std::string meshPath = (std::filesystem::path(path).parent_path() / keys.mesh.file).string();
   std::error_code unknown; // of a name that no file can have

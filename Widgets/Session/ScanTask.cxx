@@ -271,7 +271,7 @@ void ScanTask::Check() const
 
 ScanTask ScanTaskOf(const std::string& text, const std::string& name)
 {
-  const Json json = described::Parse(name, text);
+  const Json json = JsonPlace(name).Parse(text);
   NoTaskContext none;
   TaskKeys keys;
   TaskReader::Read(name, none, json, "", keys);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
 #include "Filters/Scenes/SceneViews.h"
+#include "Testing/TemporaryFolder.h"
+#include <fstream>
 #include <gtest/gtest.h>
 
 using namespace echorama;
@@ -31,6 +33,8 @@ std::string MessageOf(const SynthesisScene& scene)
   }
   return {};
 }
+
+using SceneRecordings = echorama::testing::TemporaryFolder;
 
 } // namespace
 
@@ -86,6 +90,21 @@ TEST(SceneViews, AMoveThereAndBackIsNotMissed)
   for (const TimedPose& moment : views.at(0).way)
     farthest = std::max(farthest, moment.pose.translation().x());
   EXPECT_EQ(farthest, 20.0);
+}
+
+TEST_F(SceneRecordings, TimesSoLargeThatNothingLiesBetweenThemEnd)
+{
+  std::ofstream table(Path("path.csv"));
+  table << "time,x,y,z,qw,qx,qy,qz\n" << std::fixed;
+  for (int i = 0; i < 10; ++i) // neighbouring numbers are 2 s apart there
+    table << 1e16 + 2.0 * i << "," << 10 * i << ",0,0,1,0,0,0\n";
+  table.close();
+  SynthesisScene scene = Parse(R"("gel": {}, "views": {"recording":
+    {"file": "path.csv", "smoothSeconds": 0, "longestGapSeconds": 600, "count": 2, "stepMm": 1}})");
+  scene.folder = folder.string();
+  const auto views = ViewsOf(scene);
+  ASSERT_EQ(views.size(), 2u);
+  EXPECT_EQ(views[1].way.back().pose.translation().x(), 90.0);
 }
 
 TEST(SceneViews, ASweepThatMovesHasSeveralStates)
