@@ -146,7 +146,7 @@ void Track(Session& session, TrackOptions options)
           shown = now;
           ShowNow(options, poses, transforms);
         }
-        const DeviceState state = poses.Statistics().state;
+        const DeviceState state = poses.State().first;
         if (state == DeviceState::Ended || state == DeviceState::Failed ||
             (options.seconds > 0.0 && now - start >= options.seconds))
           return;

@@ -32,6 +32,7 @@ void OpenIgtLinkListener::Stop()
 void OpenIgtLinkListener::Run(const Worker::Signal& signal, PoseStream& poses, ImageStream* images) const
 {
   std::vector<std::unique_ptr<OpenIgtLinkReceiver>> peers;
+  ToolOwners owners;
   const auto tell = [&] {
     std::string list;
     for (const auto& peer : peers)
@@ -54,11 +55,12 @@ void OpenIgtLinkListener::Run(const Worker::Signal& signal, PoseStream& poses, I
       tell();
     }
     for (std::size_t i = 0; i < peers.size();) {
-      if (peers[i]->Serve(poses, images)) {
+      if (peers[i]->Serve(poses, images, &owners)) {
         ++i;
         continue;
       }
       const std::string reason = peers[i]->Socket().Peer() + ": " + peers[i]->EndReason();
+      owners.Forget(peers[i].get());
       peers.erase(peers.begin() + static_cast<std::ptrdiff_t>(i));
       if (peers.empty())
         poses.SetState(DeviceState::Lost, reason + "; listening");

@@ -1,12 +1,36 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Tracking/Devices/OpenIgtLinkReceiver.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/Utf8.h"
 #include "Tracking/Devices/OpenIgtLinkEncoder.h"
 #include "Tracking/Stream/Clock.h"
 
 namespace echorama {
+namespace {
 
-bool OpenIgtLinkReceiver::Serve(PoseStream& poses, ImageStream* images)
+constexpr std::size_t LongestComplaint = 512; // bytes: a peer may send anything, and it is shown
+constexpr double Silence = 2.0;               // s, after which a tool's peer may have gone without a word
+
+} // namespace
+
+bool ToolOwners::Owns(const OpenIgtLinkReceiver* peer, const std::string& tool, double now)
+{
+  if (owners_.size() >= MostTools && owners_.count(tool) == 0)
+    return true; // the stream takes no more tools
+  Owner& owner = owners_.try_emplace(tool, Owner{peer, now}).first->second;
+  if (owner.peer != peer && now - owner.last < Silence)
+    return false;
+  owner = {peer, now};
+  return true;
+}
+
+void ToolOwners::Forget(const OpenIgtLinkReceiver* peer)
+{
+  for (auto owner = owners_.begin(); owner != owners_.end();)
+    owner = owner->second.peer == peer ? owners_.erase(owner) : std::next(owner);
+}
+
+bool OpenIgtLinkReceiver::Serve(PoseStream& poses, ImageStream* images, ToolOwners* owners)
 {
   unsigned char bytes[65536];
   for (int piece = 0; piece < 64; ++piece) { // then others have their turn, and a stop is seen
@@ -23,7 +47,7 @@ bool OpenIgtLinkReceiver::Serve(PoseStream& poses, ImageStream* images)
       break;
     const double arrival = ClockNow();
     for (OpenIgtLinkMessage& message : decoder_.Feed(bytes, *size))
-      Take(std::move(message), arrival, poses, images);
+      Take(std::move(message), arrival, poses, images, owners);
     if (!decoder_.InStep()) {
       end_ = "it does not speak OpenIGTLink, or has lost the thread";
       return false;
@@ -38,14 +62,18 @@ bool OpenIgtLinkReceiver::Serve(PoseStream& poses, ImageStream* images)
   return true;
 }
 
-void OpenIgtLinkReceiver::Take(OpenIgtLinkMessage message, double arrival, PoseStream& poses, ImageStream* images)
+void OpenIgtLinkReceiver::Take(OpenIgtLinkMessage message, double arrival, PoseStream& poses, ImageStream* images,
+                               ToolOwners* owners)
 {
   using Kind = OpenIgtLinkMessage::Kind;
   switch (message.kind) {
   case Kind::Poses:
     for (ToolPose& pose : message.poses) {
       pose.arrival = arrival;
-      poses.Add(std::move(pose));
+      if (owners && !owners->Owns(this, pose.name, arrival))
+        poses.Reject(Rejection::Foreign, socket_.Peer() + ": another peer sends " + pose.name + " already");
+      else
+        poses.Add(std::move(pose));
     }
     break;
   case Kind::Image:
@@ -55,7 +83,9 @@ void OpenIgtLinkReceiver::Take(OpenIgtLinkMessage message, double arrival, PoseS
     }
     break;
   case Kind::Status:
-    complaint_ = message.statusCode == 1 ? "" : "status " + std::to_string(message.statusCode) + " " + message.statusText;
+    complaint_ = message.statusCode == 1 ? ""
+                                         : "status " + std::to_string(message.statusCode) + " " +
+                                               Printable(std::string_view(message.statusText).substr(0, LongestComplaint));
     break;
   case Kind::Request:
     if (message.type == "GET_STATUS")

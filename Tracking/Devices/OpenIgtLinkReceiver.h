@@ -3,8 +3,28 @@
 #include "Tracking/Devices/OpenIgtLinkDecoder.h"
 #include "Tracking/Devices/TcpSocket.h"
 #include "Tracking/Devices/TrackerAddress.h"
+#include <map>
+#include <string>
 
 namespace echorama {
+
+class OpenIgtLinkReceiver;
+
+/// Whose tools are whose, where several peers send: two tools of one name would become one that jumps from place to place.
+class ToolOwners {
+public:
+  /// Whether \a tool may come from that \a peer \a now (s): nobody else has sent it in the last two seconds.
+  bool Owns(const OpenIgtLinkReceiver* peer, const std::string& tool, double now);
+  void Forget(const OpenIgtLinkReceiver* peer); ///< it has gone
+
+private:
+  static constexpr std::size_t MostTools = 4096; // a peer may send any number
+  struct Owner {
+    const OpenIgtLinkReceiver* peer;
+    double last;
+  };
+  std::map<std::string, Owner> owners_;
+};
 
 /// One connection whose poses and images go into streams: what client and listener have in common.
 class OpenIgtLinkReceiver {
@@ -12,7 +32,8 @@ public:
   OpenIgtLinkReceiver(TcpSocket socket, const OpenIgtLinkDecoding& decoding) : socket_(std::move(socket)), decoder_(decoding) {}
 
   /// Takes what has come, and sends what waits. \returns false when the connection has ended or must: EndReason() says why.
-  bool Serve(PoseStream& poses, ImageStream* images);
+  /// \a owners: poses of tools that belong to another peer are rejected.
+  bool Serve(PoseStream& poses, ImageStream* images, ToolOwners* owners = nullptr);
 
   const TcpSocket& Socket() const { return socket_; }
   SendQueue& Replies() { return replies_; }
@@ -21,7 +42,7 @@ public:
   const std::string& PeerComplaint() const { return complaint_; }
 
 private:
-  void Take(OpenIgtLinkMessage message, double arrival, PoseStream& poses, ImageStream* images);
+  void Take(OpenIgtLinkMessage message, double arrival, PoseStream& poses, ImageStream* images, ToolOwners* owners);
 
   TcpSocket socket_;
   OpenIgtLinkDecoder decoder_;

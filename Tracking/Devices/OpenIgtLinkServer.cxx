@@ -14,6 +14,7 @@
 #include <list>
 #include <map>
 #include <mutex>
+#include <set>
 
 namespace echorama {
 namespace {
@@ -37,7 +38,8 @@ OpenIgtLinkDecoding SmallMessages()
 }
 
 struct Client {
-  explicit Client(TcpSocket connection, std::size_t bound) : socket(std::move(connection)), decoder(SmallMessages()), queue(bound)
+  Client(TcpSocket connection, const OpenIgtLinkServerParameters& parameters)
+    : socket(std::move(connection)), decoder(SmallMessages()), queue(parameters.queuedBytes, parameters.rememberedImages)
   {
   }
 
@@ -51,6 +53,7 @@ struct Client {
   double resolution = 0.0;
   std::map<std::string, double> lastTimes; // of the tools, with TDATA
   std::vector<ToolPose> together;          // of one time, for the next TDATA
+  std::set<std::string> asked;             // whose newest pose it has asked for in this turn; "": all
 };
 
 } // namespace
@@ -85,7 +88,8 @@ struct OpenIgtLinkServer::Parts {
   void Serve(const std::vector<ToolPose>& poses);
   void Collect(Client& client, const ToolPose& pose);
   void SendTogether(Client& client);
-  bool Listen(Client& client); // to what it says; false when it must go
+  bool Listen(Client& client); // to what it says, and answers; false when it must go
+  bool Hear(Client& client);
   void Answer(Client& client, const OpenIgtLinkMessage& message);
   void Event(const std::string& text)
   {
@@ -161,7 +165,7 @@ void OpenIgtLinkServer::Parts::Accept()
     const std::string peer = socket.Peer();
     const bool room = clients.size() < parameters.clients;
     if (room)
-      clients.emplace_back(std::move(socket), parameters.queuedBytes);
+      clients.emplace_back(std::move(socket), parameters);
     const std::lock_guard<std::mutex> lock(mutex);
     ++(room ? statistics.accepted : statistics.turnedAway);
     statistics.lastEvent = peer + (room ? ": connected" : ": turned away, as there are too many");
@@ -226,6 +230,20 @@ void OpenIgtLinkServer::Parts::SendTogether(Client& client)
 
 bool OpenIgtLinkServer::Parts::Listen(Client& client)
 {
+  const bool stays = Hear(client);
+  if (!client.asked.empty() && stays) { // once, however often it asks: others wait meanwhile
+    const OpenIgtLinkEncoder encoder(client.headerVersion);
+    for (const auto& [name, pose] : newest)
+      if ((client.asked.count("") > 0 || client.asked.count(OpenIgtLinkEncoder::WireName(name)) > 0) &&
+          (pose.status == TransformStatus::Valid || client.headerVersion >= 2))
+        client.queue.Push(Shared(encoder.Transform(pose)));
+  }
+  client.asked.clear();
+  return stays;
+}
+
+bool OpenIgtLinkServer::Parts::Hear(Client& client)
+{
   unsigned char bytes[16384];
   for (int piece = 0; piece < 16; ++piece) { // then the others
     const auto size = client.socket.Receive(bytes, sizeof bytes);
@@ -265,10 +283,7 @@ void OpenIgtLinkServer::Parts::Answer(Client& client, const OpenIgtLinkMessage& 
   } else if (message.kind == Kind::Request && message.type == "GET_STATUS") {
     client.queue.Push(Shared(encoder.Status(1, "serving")));
   } else if (message.kind == Kind::Request && (message.type == "GET_TRANS" || message.type == "GET_TRANSFORM")) {
-    for (const auto& [name, pose] : newest)
-      if ((message.device.empty() || OpenIgtLinkEncoder::WireName(name) == message.device) &&
-          (pose.status == TransformStatus::Valid || client.headerVersion >= 2))
-        client.queue.Push(Shared(encoder.Transform(pose)));
+    client.asked.insert(message.device);
   } else if (message.kind == Kind::Request && message.type == "GET_IMAGE") {
     const std::lock_guard<std::mutex> lock(mutex);
     for (const NamedImage& image : images)

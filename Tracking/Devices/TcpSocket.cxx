@@ -232,6 +232,10 @@ void SendQueue::PushNewest(const std::string& name, Bytes message)
       return;
     }
   }
+  if (newest_.size() >= names_) { // a peer that does not read must not fill the memory by names
+    newest_.pop_front();
+    ++dropped_;
+  }
   newest_.emplace_back(name, std::move(message));
 }
 

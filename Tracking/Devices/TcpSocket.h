@@ -72,11 +72,12 @@ class SendQueue {
 public:
   using Bytes = std::shared_ptr<const std::vector<unsigned char>>;
 
-  explicit SendQueue(std::size_t bound = std::size_t{1} << 20) : bound_(bound) {}
+  /// \param bound bytes of what waits in turn. \param names of which the newest is kept; one more costs the oldest.
+  explicit SendQueue(std::size_t bound = std::size_t{1} << 20, std::size_t names = 64) : bound_(bound), names_(names) {}
 
   /// In turn, within the bound.
   void Push(Bytes message);
-  /// Outside the bound and behind all others: large things, of which only the newest of each name is worth sending.
+  /// Outside the bound in bytes and behind all others: large things, of which only the newest of each name is worth sending.
   void PushNewest(const std::string& name, Bytes message);
 
   /// Sends what the socket takes now. \returns false when the connection has ended.
@@ -88,9 +89,9 @@ public:
 private:
   void Begin(); // the next, if there is one
 
-  std::size_t bound_, bytes_ = 0; // of what waits
-  Bytes begun_;                   // must be finished, whatever else is dropped
-  std::size_t offset_ = 0;        // how much of it has gone
+  std::size_t bound_, names_, bytes_ = 0; // of what waits
+  Bytes begun_;                           // must be finished, whatever else is dropped
+  std::size_t offset_ = 0;                // how much of it has gone
   std::deque<Bytes> waiting_;
   std::deque<std::pair<std::string, Bytes>> newest_;
   std::uint64_t sent_ = 0, dropped_ = 0;

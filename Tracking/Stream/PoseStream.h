@@ -35,7 +35,7 @@ const char* DeviceStateText(DeviceState state); ///< "idle", "connecting" ...
 enum class Rejection {
   Malformed,    ///< not what the format says: lengths, checks, words
   TooLarge,     ///< a length beyond what a tracker sends
-  Foreign,      ///< from a sender beyond those that are listened to
+  Foreign,      ///< from a sender beyond those that are listened to, or of a tool that another one sends
   NotRigid,     ///< a matrix that is no pose; the tool counts as Missing at that moment
   Duplicate,    ///< the same tool and time again
   OutOfOrder,   ///< older than the newest of its tool, but by less than a jump of the clock

@@ -5,6 +5,7 @@
 #include "Tracking/Devices/OpenIgtLinkClient.h"
 #include "Tracking/Devices/OpenIgtLinkEncoder.h"
 #include "Tracking/Devices/OpenIgtLinkListener.h"
+#include "Tracking/Devices/OpenIgtLinkReceiver.h"
 #include "Tracking/Devices/OpenIgtLinkServer.h"
 #include "Tracking/Devices/TcpSocket.h"
 #include "Tracking/Stream/Clock.h"
@@ -167,6 +168,25 @@ TEST(SendQueue, DropsTheOldestWholeMessagesAndKeepsTheNewestImage)
     expected.insert(expected.end(), static_cast<std::size_t>(count), static_cast<unsigned char>(value));
   EXPECT_EQ(got, expected);
   EXPECT_EQ(queue.Sent(), 5u);
+}
+
+TEST(SendQueue, NewNamesOfImagesCostTheOldest)
+{
+  const TcpSocket listener = TcpSocket::Listen("127.0.0.1", 0);
+  TcpSocket client = TcpSocket::Connect("127.0.0.1", listener.Port(), 5.0, nullptr), server;
+  ASSERT_TRUE(Eventually([&] { return (server = listener.Accept()).IsOpen(); }));
+  SendQueue queue(100, 2);
+  for (const char* name : {"a", "b", "a", "c", "d"})
+    queue.PushNewest(name, std::make_shared<const Bytes>(1, static_cast<unsigned char>(*name)));
+  EXPECT_EQ(queue.Dropped(), 3u); // the first a, the second, b
+  Bytes got;
+  ASSERT_TRUE(Eventually([&] {
+    EXPECT_TRUE(queue.Flush(server));
+    unsigned char bytes[16];
+    got.insert(got.end(), bytes, bytes + client.Receive(bytes, sizeof bytes).value_or(0));
+    return got.size() >= 2;
+  }));
+  EXPECT_EQ(got, (Bytes{'c', 'd'}));
 }
 
 TEST(OpenIgtLink, EveryPoseArrivesAsTransformAndAsTrackingData)
@@ -428,6 +448,10 @@ TEST(OpenIgtLink, TheClientCountsGarbageHalfMessagesAndLengthsThatCannotBe)
     // What its status says is passed on.
     ASSERT_TRUE(SendAll(peer, OpenIgtLinkEncoder().Status(13, "warming up")));
     ASSERT_TRUE(Eventually([&] { return poses.Statistics().message.find("warming up") != std::string::npos; }));
+    ASSERT_TRUE(SendAll(peer, OpenIgtLinkEncoder().Status(5, "\xc2\x9b" + std::string(1000000, 'x'))));
+    ASSERT_TRUE(Eventually([&] { return poses.Statistics().message.find("xxx") != std::string::npos; }));
+    EXPECT_NE(poses.Statistics().message.find("\\xc2\\x9bxxx"), std::string::npos) << "as it would end up in a terminal";
+    EXPECT_LT(poses.Statistics().message.size(), 1000u);
   }
 }
 
@@ -457,6 +481,44 @@ TEST(OpenIgtLink, TheListenerTakesWhatSeveralPeersPush)
   first.Close();
   second.Close();
   ASSERT_TRUE(Eventually([&] { return poses.Statistics().state == DeviceState::Lost; }));
+}
+
+TEST(OpenIgtLink, AToolComesFromOnePeerUntilItHasGone)
+{
+  PoseStream poses;
+  OpenIgtLinkListener listener(TrackerAddress::Parse("igtl-listen://:0"));
+  listener.Start(poses, nullptr);
+  TcpSocket first = TcpSocket::Connect("127.0.0.1", listener.Port(), 5.0, nullptr),
+            second = TcpSocket::Connect("127.0.0.1", listener.Port(), 5.0, nullptr);
+  ASSERT_TRUE(SendAll(first, OpenIgtLinkEncoder().Transform(At("ProbeToTracker", Now()))));
+  ASSERT_TRUE(Eventually([&] { return Valid(poses, "ProbeToTracker") == 1; }));
+  ASSERT_TRUE(SendAll(second, OpenIgtLinkEncoder().Transform(At("ProbeToTracker", Now() + 1.0))));
+  ASSERT_TRUE(SendAll(second, OpenIgtLinkEncoder().Transform(At("StylusToTracker", Now() + 1.0))));
+  ASSERT_TRUE(Eventually([&] { return Valid(poses, "StylusToTracker") == 1; }));
+  EXPECT_EQ(Valid(poses, "ProbeToTracker"), 1u);
+  EXPECT_EQ(poses.Statistics().Rejected(Rejection::Foreign), 1u);
+  EXPECT_NE(poses.Statistics().lastRejection.find("another peer sends ProbeToTracker"), std::string::npos);
+  first.Close();
+  double time = Now() + 2.0;
+  EXPECT_TRUE(Eventually([&] { // as soon as it is seen that it has gone
+    EXPECT_TRUE(SendAll(second, OpenIgtLinkEncoder().Transform(At("ProbeToTracker", time += 1.0))));
+    return Valid(poses, "ProbeToTracker") > 1;
+  }));
+}
+
+TEST(OpenIgtLink, AToolGoesOnFromAnotherPeerWhenItsOwnIsSilent)
+{
+  const OpenIgtLinkReceiver one({}, {}), other({}, {});
+  ToolOwners owners;
+  EXPECT_TRUE(owners.Owns(&one, "a", 10.0));
+  EXPECT_FALSE(owners.Owns(&other, "a", 11.0));
+  EXPECT_TRUE(owners.Owns(&one, "a", 11.5));
+  EXPECT_FALSE(owners.Owns(&other, "a", 13.0));
+  EXPECT_TRUE(owners.Owns(&other, "a", 14.0)); // a connection that broke without a word
+  EXPECT_FALSE(owners.Owns(&one, "a", 15.0));
+  EXPECT_TRUE(owners.Owns(&one, "b", 15.0));
+  owners.Forget(&other);
+  EXPECT_TRUE(owners.Owns(&one, "a", 15.0));
 }
 
 TEST(OpenIgtLink, TheListenerDoesNotSpinWhenThereAreNoDescriptors)
@@ -534,6 +596,44 @@ TEST(OpenIgtLink, TheServerAnswersRequests)
   ASSERT_TRUE(wait("TRANSFORM"));
   EXPECT_EQ(got.back().poses.at(0).time, Now() + 2.0);
   EXPECT_THROW(server.Send(At("ThisOneIsFarTooLongToBeTrueToTracker", Now())), Error);
+}
+
+TEST(OpenIgtLink, WhoAsksAThousandTimesAtOnceIsAnsweredSeldom)
+{
+  OpenIgtLinkServer server(AnyPort());
+  server.Start(nullptr);
+  TcpSocket peer = TcpSocket::Connect("127.0.0.1", server.Port(), 5.0, nullptr);
+  OpenIgtLinkDecoder decoder;
+  int answers = 0;
+  bool isLast = false;
+  const auto receive = [&] {
+    unsigned char bytes[4096];
+    for (const OpenIgtLinkMessage& message : decoder.Feed(bytes, peer.Receive(bytes, sizeof bytes).value_or(0))) {
+      answers += message.type == "TRANSFORM";
+      isLast = isLast || message.type == "RTS_TDATA";
+    }
+  };
+  server.Send(At("ProbeToTracker", Now()));
+  ASSERT_TRUE(Eventually([&] {
+    receive();
+    return answers == 1;
+  }));
+  Bytes request = OpenIgtLinkEncoder().Bare("GET_TRANS"), requests;
+  std::fill(request.begin() + 14, request.begin() + 34, static_cast<unsigned char>(0)); // of any tool
+  for (int i = 0; i < 1000; ++i)
+    requests.insert(requests.end(), request.begin(), request.end());
+  ASSERT_TRUE(SendAll(peer, requests));
+  ASSERT_TRUE(SendAll(peer, OpenIgtLinkEncoder().Bare("STP_TDATA")));
+  ASSERT_TRUE(Eventually([&] {
+    receive();
+    return isLast;
+  }));
+  EXPECT_TRUE(server.Flush(Patience));
+  EXPECT_TRUE(Eventually([&] { // the answer of the last turn may follow the reply
+    receive();
+    return answers > 1;
+  }));
+  EXPECT_LT(answers, 100);
 }
 
 TEST(OpenIgtLink, TheLibrarysClientUnderstandsOurServer)
