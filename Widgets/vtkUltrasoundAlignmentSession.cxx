@@ -441,6 +441,7 @@ bool vtkUltrasoundAlignmentSession::OpenProject(const char* path, vtkMultiBlockD
     for (std::size_t i = 0; i < images.size(); ++i) {
       this->Images->Hold(this->Session.State().volumes[i], images[i]);
     }
+    this->Warn(DisplacementNote(name));
     if (stamp.number > 0) {
       this->Storage.Recovered(name);
     } else {
@@ -480,6 +481,7 @@ bool vtkUltrasoundAlignmentSession::ReadPoses(const char* path)
 {
   return this->Change([&]() {
     const std::map<int, Pose> poses = ReadPosesOf(this->Session.State(), TextOf(path));
+    this->Warn(DisplacementNote(TextOf(path)));
     this->Session.Begin("Poses of " + fs::path(TextOf(path)).filename().string());
     for (const auto& [id, pose] : poses) {
       this->Session.SetPose(id, pose);
@@ -491,7 +493,7 @@ bool vtkUltrasoundAlignmentSession::ReadPoses(const char* path)
 //----------------------------------------------------------------------------
 bool vtkUltrasoundAlignmentSession::WritePoses(const char* path)
 {
-  return this->Change([&]() { WritePosesOf(this->Session.State(), TextOf(path)); });
+  return this->Change([&]() { WritePosesOf(this->Session.State(), TextOf(path), this->Truth.File()); });
 }
 
 //----------------------------------------------------------------------------

@@ -274,8 +274,8 @@ public:
    * Without, files are read side by side. A backup opens without its volumes that were in no file, with a warning that names
    * them; the backups of an abandoned session become those of the session that opens one. Saving is atomic; volumes that are in
    * no file cannot be saved; \a withoutUnsavedResults leaves such results out, and they count as not saved. When somebody else
-   * has changed the project file since it was opened or saved here, saving is refused once; saving again replaces it. A file of
-   * one of the volumes is never replaced. */
+   * has changed the project file since it was opened or saved here, saving is refused once; saving again replaces it. Never
+   * replaced are files of volumes and of the truth, and poses that name displacements, which a session does not keep. */
   bool OpenProject(const char* path, vtkMultiBlockDataSet* volumes = nullptr);
   bool SaveProject(const char* path, bool withoutUnsavedResults = false);
   /** The project with all that it needs in one new folder, which opens on another machine: FOLDER/NAME.json, FOLDER/volumes, and

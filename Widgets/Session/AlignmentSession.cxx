@@ -466,14 +466,15 @@ int AlignmentSession::GroupSelection()
     }
   if (one)
     return group;
-  int highest = 0;
+  std::set<int> taken;
   for (const SessionVolume& volume : state_.volumes)
-    highest = std::max(highest, volume.group);
+    taken.insert(volume.group);
+  group = NextNumber(taken);
   Edit("Group " + std::to_string(selection_.size()) + " volumes", [&] {
     for (const int id : selection_)
-      Volume(id).group = highest + 1;
+      Volume(id).group = group;
   });
-  return highest + 1;
+  return group;
 }
 
 void AlignmentSession::UngroupSelection()

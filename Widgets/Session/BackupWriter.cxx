@@ -199,6 +199,12 @@ std::string BackupWriter::TakeFailure()
   return parts_->Failure();
 }
 
+std::set<int> BackupWriter::Numbers()
+{
+  Wait();
+  return parts_->backups.Numbers();
+}
+
 void BackupWriter::MarkSaved()
 {
   Wait();

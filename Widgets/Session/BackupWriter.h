@@ -2,6 +2,7 @@
 #pragma once
 #include "Widgets/Session/Backups.h"
 #include <memory>
+#include <set>
 #include <string>
 
 namespace echorama {
@@ -29,6 +30,7 @@ public:
   /// Why a backup could not be written: told once, until one could be written again; empty: all is well.
   std::string TakeFailure();
   ///@{ As those of Backups, of all that was posted.
+  std::set<int> Numbers();
   void MarkSaved();
   void DiscardUnsaved();
   ///@}

@@ -262,6 +262,7 @@ bool Backups::Write(const Project& project, const std::string& label, bool inPla
     unsynced_.push_back(path);
   }
   lastStamp_ = stamp;
+  numbers_.insert(stamp.number);
   after_.number = stamp.number;
   last_ = project;
   lastPath_ = path;
@@ -301,10 +302,12 @@ std::vector<Backup> Backups::ListFor(const std::string& path)
   return Opened(NamedFor(path));
 }
 
-int Backups::LastNumberFor(const std::string& path)
+std::set<int> Backups::NumbersFor(const std::string& path)
 {
-  const std::vector<Backup> backups = NamedFor(path);
-  return backups.empty() ? 0 : backups.front().number;
+  std::set<int> numbers;
+  for (const Backup& backup : NamedFor(path))
+    numbers.insert(backup.number);
+  return numbers;
 }
 
 std::optional<Backup> Backups::NewestFor(const std::string& path, const timespec& saved, const LastBackup& last)
@@ -315,10 +318,10 @@ std::optional<Backup> Backups::NewestFor(const std::string& path, const timespec
     std::stable_sort(backups.begin(), backups.end(), [](const Backup& a, const Backup& b) { return a.time > b.time; });
   for (Backup& backup : backups) {
     struct stat file {};
-    if (isNumbered ? backup.number <= last.number
+    if (isNumbered ? backup.number <= last.number && last.others.count(backup.number) == 0
                    : backup.time < saved.tv_sec ||
                          (backup.time == saved.tv_sec && stat(backup.path.c_str(), &file) == 0 && IsBefore(file.st_mtim, saved)))
-      break;
+      continue;
     echorama::Read(backup);
     if (backup.readable && (!isNumbered || backup.lineage == last.lineage))
       return backup;

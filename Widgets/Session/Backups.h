@@ -5,6 +5,7 @@
 #include <ctime>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,7 @@ public:
   /// Waits until what was written is on the disk, and removes what it took the place of. Another thread may call this while
   /// one writes. \throws Error(FileSystem): all stay, and the next call tries again.
   void Sync();
+  const std::set<int>& Numbers() const { return numbers_; } ///< of what was written here
   /// What was written here is in the project file now; DiscardUnsaved() leaves it.
   void MarkSaved() { unsaved_.clear(); }
   /// Removes what was written here since the last MarkSaved().
@@ -62,11 +64,12 @@ public:
   static std::string FolderFor(const std::string& path);
   /// All backups of a project, in either folder: the newest first.
   static std::vector<Backup> ListFor(const std::string& path);
-  /// The largest number of a backup of a project, in either folder; 0: there is none.
-  static int LastNumberFor(const std::string& path);
+  /// The numbers of the backups of a project, in either folder.
+  static std::set<int> NumbersFor(const std::string& path);
   /// The newest that can be read, when it was made after the project was last written: its label is not told. It is later when it
-  /// is of the lineage of \a last and has a larger number. For a project that does not know its last backup, the time \a saved of
-  /// its file decides: names of backups tell seconds; within the same second the times of the files count.
+  /// is of the lineage of \a last and has a larger number, or one of the others. For a project that does not know its last
+  /// backup, the time \a saved of its file decides: names of backups tell seconds; within the same second the times of the files
+  /// count.
   static std::optional<Backup> NewestFor(const std::string& path, const timespec& saved, const LastBackup& last);
   /// Sessions that ended without being saved: their folders, the newest first. Those that still run are not among them.
   static std::vector<std::string> Abandoned();
@@ -86,6 +89,7 @@ private:
   std::optional<Project> last_;
   std::string lastPath_;
   BackupStamp lastStamp_;
+  std::set<int> numbers_;
   std::vector<std::string> unsaved_;
   std::mutex mutex_; ///< of what follows
   std::vector<std::string> unsynced_, replaced_;

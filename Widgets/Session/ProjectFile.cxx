@@ -28,6 +28,7 @@ using Json = JsonPlace::Json;
 
 constexpr const char* Schema = "echorama-project-1";
 constexpr const char* PoseSchema = "echorama-poses-1";
+constexpr int LargestBackup = 999999999;              // nine digits of a file's name, beyond those that a project may go on from
 constexpr std::size_t Limit = std::size_t{512} << 20; // bytes of a file
 
 fs::path Resolved(const fs::path& path)
@@ -75,10 +76,10 @@ double UnitNumber(const Json& value, const JsonPlace& place)
   return number;
 }
 
-int Count(const Json& value, const JsonPlace& place)
+int Count(const Json& value, const JsonPlace& place, int largest = LargestNumber)
 {
-  if (!value.is_number_integer() || value.get<double>() < 0.0 || value.get<double>() > 1e9)
-    place.Fail("a whole number, at least 0, is needed");
+  if (!value.is_number_integer() || value.get<double>() < 0.0 || value.get<double>() > largest)
+    place.Fail("a whole number from 0 to " + std::to_string(largest) + " is needed");
   return value.get<int>();
 }
 
@@ -216,9 +217,9 @@ void CheckBackup(Json& root, const JsonPlace& file, BackupStamp& stamp)
 {
   Json& backup = root["backup"];
   const JsonPlace place = file.In("backup");
-  stamp.number = Count(place.Member(backup, "number"), place.In("number"));
+  stamp.number = Count(place.Member(backup, "number"), place.In("number"), LargestBackup);
   if (backup.contains("inPlaceOf"))
-    stamp.inPlaceOf = Count(backup["inPlaceOf"], place.In("inPlaceOf"));
+    stamp.inPlaceOf = Count(backup["inPlaceOf"], place.In("inPlaceOf"), LargestBackup);
   if (backup.contains("lineage"))
     stamp.lineage = place.In("lineage").Text(backup["lineage"]);
   const Json& time = place.Member(backup, "time");
@@ -312,6 +313,7 @@ Project ReadProject(const std::string& path, BackupStamp* stamp)
   const fs::path folder = Resolved(path).parent_path(), beside = fs::absolute(path).parent_path();
   Project project;
   std::set<std::string> names, files;
+  std::map<std::string, int> copies; // the next number of those that have a name in common
   for (const Json& value : volumes) {
     const int number = static_cast<int>(project.state.volumes.size()) + 1;
     const JsonPlace place = file.In("volume " + std::to_string(number));
@@ -322,7 +324,7 @@ Project ReadProject(const std::string& path, BackupStamp* stamp)
     if (value.contains("name") && names.count(volume.name))
       place.Fail("another volume has the name " + volume.name);
     const std::string wanted = volume.name;
-    for (int copy = 2; !names.insert(volume.name).second; ++copy)
+    for (int& copy = copies.try_emplace(wanted, 2).first->second; !names.insert(volume.name).second; ++copy)
       volume.name = wanted + " (" + std::to_string(copy) + ")";
     if (value.contains("TrueVolumeToWorld"))
       project.truths[volume.name] = PoseJson::ToPose(value["TrueVolumeToWorld"], place.In("TrueVolumeToWorld"));
@@ -347,6 +349,9 @@ Project ReadProject(const std::string& path, BackupStamp* stamp)
     const JsonPlace place = file.In("lastBackup");
     project.lastBackup = {place.In("lineage").Text(place.Member(root["lastBackup"], "lineage")),
                           Count(place.Member(root["lastBackup"], "number"), place.In("number"))};
+    if (root["lastBackup"].contains("others"))
+      for (const Json& other : root["lastBackup"]["others"])
+        project.lastBackup.others.insert(Count(other, place.In("others")));
   }
   if (stamp)
     *stamp = found;
@@ -402,7 +407,8 @@ std::string TextOf(const Project& project, const std::string& path, const Backup
   if (project.state.centre)
     root["centreOfRotation"] = JsonPlace::ListOf(*project.state.centre);
   if (!stamp && !project.lastBackup.lineage.empty())
-    root["lastBackup"] = {{"lineage", project.lastBackup.lineage}, {"number", project.lastBackup.number}};
+    root["lastBackup"] = {
+        {"lineage", project.lastBackup.lineage}, {"number", project.lastBackup.number}, {"others", project.lastBackup.others}};
   try {
     if (stamp) {
       root["backup"] = {{"number", stamp->number}, {"time", stamp->time}, {"label", stamp->label}};

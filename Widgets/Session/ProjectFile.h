@@ -3,6 +3,7 @@
 #include "Widgets/Session/SessionState.h"
 #include <cstdint>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,7 @@ std::string ResolvedPath(const std::string& path);
 struct LastBackup {
   std::string lineage; ///< empty: none is known
   int number = 0;
+  std::set<int> others{}; ///< not beyond that number, but of other windows on the project: their work is not in the file
 };
 
 /// What a project file holds.
@@ -45,7 +47,7 @@ struct BackupStamp {
 /// "geometry", "VolumeToWorld", "colour", "opacity", "visible", "group", "strokes": [{"mode", "radiusMm", "intensity", "opacity",
 /// "hardness", "insideValid", "pathMm": [[3], ...]}], "landmarks": [{"label", "position": [3]}], "madeOf", "TrueVolumeToWorld",
 /// "fixed"}], "measurements": [{"number", "points": [[3], ...]}], "truth", "comment", "centreOfRotation", "lastBackup":
-/// {"lineage", "number"}}. Documentation/session.md tells of each.
+/// {"lineage", "number", "others"}}. Documentation/session.md tells of each.
 ///
 /// A project is a pose file too (ReadPoses reads it): the same fields with the same meaning, plus what a session knows. And a
 /// pose file ("echorama-poses-1") is a project whose volumes have default looks: all keys of a volume but "file" and

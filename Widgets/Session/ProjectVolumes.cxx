@@ -3,6 +3,7 @@
 // alone counts only when nothing else could be meant, and geometries are compared before anything is taken over.
 #include "Widgets/Session/ProjectVolumes.h"
 #include "Core/Base/Error.h"
+#include "Core/Base/TextFile.h"
 #include "Core/Geometry/CoarseGrid.h"
 #include "Widgets/Session/ProjectFile.h"
 #include <algorithm>
@@ -48,7 +49,7 @@ std::map<int, Pose> ReadPosesOf(const SessionState& state, const std::string& pa
   return found;
 }
 
-void WritePosesOf(const SessionState& state, const std::string& path)
+void WritePosesOf(const SessionState& state, const std::string& path, const std::string& truth)
 {
   std::vector<VolumePose> poses;
   for (const SessionVolume& volume : state.volumes) {
@@ -58,16 +59,36 @@ void WritePosesOf(const SessionState& state, const std::string& path)
       throw Error(Error::Kind::InvalidParameter, volume.name + ": it is in no file; poses are written of files");
     poses.push_back({volume.file, volume.geometry, volume.volumeToWorld});
   }
-  CheckIsNoVolume(ResolvedPath(path), state);
+  CheckMayBeReplaced(ResolvedPath(path), state, truth);
   WritePoses(path, poses);
 }
 
-void CheckIsNoVolume(const std::string& path, const SessionState& state)
+void CheckMayBeReplaced(const std::string& path, const SessionState& state, const std::string& truth)
 {
   std::error_code error;
+  const auto isThis = [&](const std::string& file) {
+    return !file.empty() && (file == path || fs::equivalent(file, path, error));
+  };
   for (const SessionVolume& volume : state.volumes)
-    if (!volume.file.empty() && (volume.file == path || fs::equivalent(volume.file, path, error)))
+    if (isThis(volume.file))
       throw Error(Error::Kind::InvalidParameter, path + ": it is the file of the volume " + volume.name + " and stays");
+  if (isThis(truth))
+    throw Error(Error::Kind::InvalidParameter, path + ": it is the file of the true poses and stays");
+  if (const std::string note = DisplacementNote(path); !note.empty())
+    throw Error(Error::Kind::NotPossible, note + "; choose another name");
+}
+
+std::string DisplacementNote(const std::string& path)
+{
+  std::string names;
+  try {
+    if (ReadTextFile(path).find("\"displacement\"") != std::string::npos) // most have none
+      for (const VolumePose& pose : ReadPoses(path))
+        if (!pose.displacement.empty())
+          names += (names.empty() ? "" : ", ") + fs::path(pose.file).filename().string();
+  } catch (const Error&) { // it is something else, or not there
+  }
+  return names.empty() ? names : path + ": its displacements (of " + names + ") are neither shown here nor kept";
 }
 
 bool SameWork(const SessionState& a, const SessionState& b)

@@ -17,11 +17,15 @@ std::optional<Pose> PoseAmong(const std::vector<VolumePose>& poses, const Sessio
 /// Those of all volumes that the pose file \a path names, by id. \throws as ReadPoses and PoseFor, Error(BadInput) when it names
 /// none.
 std::map<int, Pose> ReadPosesOf(const SessionState& state, const std::string& path);
-/// \throws Error(InvalidParameter) when a volume is in no file or \a path is the file of one, and as WritePoses.
-void WritePosesOf(const SessionState& state, const std::string& path);
+/// \throws Error(InvalidParameter) when a volume is in no file, and as CheckMayBeReplaced and WritePoses.
+void WritePosesOf(const SessionState& state, const std::string& path, const std::string& truth = {});
 
-/// A mistyped name must not cost a volume. \throws Error(InvalidParameter) when \a path is the file of one of them.
-void CheckIsNoVolume(const std::string& path, const SessionState& state);
+/// A name that was mistyped must not cost anything. \throws Error(InvalidParameter) when \a path is the file of a volume or of
+/// the \a truth, Error(NotPossible) when it is a pose file that names displacements, which would be lost.
+void CheckMayBeReplaced(const std::string& path, const SessionState& state, const std::string& truth);
+
+/// Which poses of a file come with a displacement (align --deformable), which sessions do not know, as a sentence; empty: none.
+std::string DisplacementNote(const std::string& path);
 
 /// Whether two states are the same work, whatever the ids; geometries may differ as much as they do after a file.
 bool SameWork(const SessionState& a, const SessionState& b);

@@ -73,8 +73,8 @@ std::string AlignmentSession::NextLandmarkLabel(int id) const
 void AlignmentSession::SetMeasurement(const Measurement& measurement)
 {
   const auto& points = measurement.points;
-  if (measurement.number < 1)
-    throw Error(Error::Kind::InvalidParameter, "measurements count from 1");
+  if (measurement.number < 1 || measurement.number > LargestNumber)
+    throw Error(Error::Kind::InvalidParameter, "measurements count from 1 to " + std::to_string(LargestNumber));
   if (points.size() != 2 && points.size() != 3)
     throw Error(Error::Kind::InvalidParameter, "a measurement needs two points, or three for an angle");
   if (!std::all_of(points.begin(), points.end(), [](const Eigen::Vector3d& point) { return point.allFinite(); }))
@@ -106,10 +106,10 @@ void AlignmentSession::ClearMeasurements()
 
 int AlignmentSession::NextMeasurementNumber() const
 {
-  int number = 1;
+  std::set<int> taken;
   for (const Measurement& each : state_.measurements)
-    number = std::max(number, each.number + 1);
-  return number;
+    taken.insert(each.number);
+  return NextNumber(taken);
 }
 
 } // namespace echorama

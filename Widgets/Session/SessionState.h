@@ -8,10 +8,22 @@
 #include <array>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 namespace echorama {
+
+inline constexpr int LargestNumber = 99999999; ///< of groups, of measurements, and of the backup that a project goes on from
+
+/// For something new beside those that are \a taken: one beyond the largest or, where there is none, the smallest that is free.
+inline int NextNumber(const std::set<int>& taken)
+{
+  int number = taken.empty() ? 1 : *taken.rbegin() + 1;
+  for (number = number > LargestNumber ? 1 : number; taken.count(number) > 0;)
+    ++number;
+  return number;
+}
 
 /// A volume as an alignment session knows it, without its voxels.
 struct SessionVolume {

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <set>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <utility>
@@ -21,6 +22,11 @@ namespace {
 std::string NewLineage()
 {
   return std::to_string(getpid()) + "-" + std::to_string(std::chrono::system_clock::now().time_since_epoch().count());
+}
+
+int LastOf(const std::set<int>& numbers)
+{
+  return numbers.empty() ? 0 : *numbers.rbegin();
 }
 
 } // namespace
@@ -39,6 +45,7 @@ void SessionStorage::Opened(const std::string& path, const Project& project, std
   path_ = ResolvedPath(path);
   fingerprint_ = fingerprint;
   saved_ = project;
+  offered_ = LastOf(Backups::NumbersFor(path_));
   lineage_ = project.lastBackup.lineage;
   unworked_ = project.state;
   isUnfinished_ = false;
@@ -50,7 +57,7 @@ void SessionStorage::Recovered(const std::string& path)
   const std::string folder = fs::absolute(path).parent_path().lexically_normal().string();
   recovered_ = std::count(abandoned.begin(), abandoned.end(), folder) > 0 ? folder : std::string();
   path_.clear();
-  fingerprint_ = 0;
+  fingerprint_ = offered_ = 0;
   saved_ = {};
   lineage_.clear();
   unworked_ = {};
@@ -80,7 +87,7 @@ std::string SessionStorage::Save(const std::string& given, Project project, bool
       throw Error(Error::Kind::InvalidParameter, path + ": the volume " + volume.name +
                                                      " is in no file; write it to one and add that instead" +
                                                      (volume.madeOf ? ", or leave results that are not saved out" : ""));
-  CheckIsNoVolume(path, project.state);
+  CheckMayBeReplaced(path, project.state, project.truth);
   const std::size_t there = FingerprintOf(path);
   if (path_ == path && there != 0 && there != std::exchange(fingerprint_, there))
     throw Error(Error::Kind::NotPossible, path + ": somebody else has changed it since it was opened or saved here; save again "
@@ -88,8 +95,12 @@ std::string SessionStorage::Save(const std::string& given, Project project, bool
   if (writer_)
     writer_->Wait(); // what was posted is earlier
   const bool goesOn = path_ == path;
+  const std::set<int> all = Backups::NumbersFor(path), ours = writer_ ? writer_->Numbers() : std::set<int>();
   project.lastBackup = {goesOn && !lineage_.empty() ? lineage_ : NewLineage(),
-                        std::max(goesOn ? saved_.lastBackup.number : 0, Backups::LastNumberFor(path))};
+                        std::max(goesOn ? saved_.lastBackup.number : 0, LastOf(all))};
+  for (const int number : all)
+    if (goesOn && number > offered_ && ours.count(number) == 0)
+      project.lastBackup.others.insert(number);
   WriteProject(path, project);
   saved_ = project;
   lineage_ = project.lastBackup.lineage;
@@ -104,14 +115,16 @@ std::string SessionStorage::Save(const std::string& given, Project project, bool
   const std::string before = writer_ && path_.empty() ? writer_->Folder() : std::string();
   writer_.reset();
   path_ = path;
+  std::string trouble;
   try {
     TakeOver(Backups::FolderFor(path));
     if (!before.empty())
       Backups::Move(before, Backups::FolderFor(path));
   } catch (const std::exception& error) { // the project is saved all the same
-    return "the earlier backups stay in " + before + ": " + error.what();
+    trouble = "the earlier backups stay in " + before + ": " + error.what();
   }
-  return {};
+  offered_ = LastOf(Backups::NumbersFor(path)); // those that came along are of here
+  return trouble;
 }
 
 void SessionStorage::Leave(const SessionState& state, const std::string& comment)
@@ -141,7 +154,7 @@ BackupWriter& SessionStorage::Writer()
   if (!writer_) {
     if (lineage_.empty())
       lineage_ = NewLineage();
-    const int there = path_.empty() ? 0 : Backups::LastNumberFor(path_);
+    const int there = path_.empty() ? 0 : LastOf(Backups::NumbersFor(path_));
     writer_ = std::make_unique<BackupWriter>(Backups::FolderFor(path_),
                                              LastBackup{lineage_, std::max(saved_.lastBackup.number, there)});
     TakeOver(writer_->Folder());

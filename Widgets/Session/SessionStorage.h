@@ -25,8 +25,8 @@ public:
   /// The truth that came of it: its path may be another than the project had.
   void SetSavedTruth(const std::string& truth, const std::map<std::string, Pose>& truths);
   /// Writes the project file; backups lie beside it from then on. \returns why earlier ones stay where they are, or nothing.
-  /// \throws Error(InvalidParameter) for a project without name or with volumes that are in no file, or when \a path is the file
-  /// of one; Error(NotPossible), once, when somebody else has changed the file; Error(FileSystem).
+  /// \throws Error(InvalidParameter) for a project without name or with volumes that are in no file, and as CheckMayBeReplaced();
+  /// Error(NotPossible), once, when somebody else has changed the file; Error(FileSystem).
   /// \param withoutUnsavedResults leaves results that are in no file out of the project; they are not saved then.
   std::string Save(const std::string& path, Project project, bool withoutUnsavedResults = false);
   /// What a project file says, to notice that somebody else has written it. 0: it cannot be read.
@@ -67,6 +67,7 @@ private:
   std::string path_;
   Project saved_;
   std::size_t fingerprint_ = 0;
+  int offered_ = 0; ///< the last backup when it was opened: later ones that were not made here are of another window
   SessionState unworked_;
   std::string lineage_;   ///< of the backups that are made here; empty: not known yet
   std::string recovered_; ///< the folder of the abandoned session that goes on here

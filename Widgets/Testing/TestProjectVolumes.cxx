@@ -115,6 +115,12 @@ TEST_F(ProjectFolder, PosesGoThroughAFile)
   EXPECT_EQ(poses.at(6).matrix(), state.volumes[1].volumeToWorld.matrix());
   EXPECT_THROW(ReadPosesOf({{Volume(4, "c", "c.mha")}}, Path("poses.json")), Error) << "it names none";
   EXPECT_THROW(WritePosesOf(state, Path("b.mha")), Error) << "a volume's file stays";
+  EXPECT_THROW(WritePosesOf(state, Path("poses.json"), Path("poses.json")), Error) << "so does that of the truth";
+  EXPECT_EQ(DisplacementNote(Path("poses.json")), "");
+  WritePoses(Path("bent.json"), {{Path("b.mha"), state.volumes[1].geometry, Pose::Identity(), Path("b.vti")}});
+  EXPECT_EQ(DisplacementNote(Path("bent.json")),
+            Path("bent.json") + ": its displacements (of b.mha) are neither shown here nor kept");
+  EXPECT_EQ(DisplacementNote(Path("absent.json")), "");
   state.volumes[0].file.clear();
   EXPECT_THROW(WritePosesOf(state, Path("poses.json")), Error);
 }

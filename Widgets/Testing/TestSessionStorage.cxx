@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Core/Base/Error.h"
+#include "Core/Geometry/PoseFile.h"
 #include "SomeProject.h"
 #include "Widgets/Session/SessionStorage.h"
 #include <chrono>
@@ -178,6 +179,79 @@ TEST_F(SessionOnDisk, WhatIsLaterDoesNotDependOnTheClock)
   next.BackUp(Step(41), "later", true);
   EXPECT_EQ(later(other, 40), 41);
   EXPECT_EQ(later(path, 8), 9);
+}
+
+TEST_F(SessionOnDisk, WhatAnotherWindowHasNotSavedIsLaterWhateverThisOneSaves)
+{
+  const std::string path = Path("p.json");
+  const auto later = [&](int open) {
+    SessionStorage storage;
+    storage.Opened(path, ReadProject(path), SessionStorage::FingerprintOf(path));
+    const std::string found = storage.LaterBackup(Step(open), {});
+    return found.empty() ? 0 : static_cast<int>(ReadProject(found).state.volumes[0].volumeToWorld.translation().x());
+  };
+  SessionStorage first;
+  first.BackUp(Step(1), "before the first save", true);
+  first.Save(path, Step(1));
+  first.BackUp(Step(2), "two", true);
+  SessionStorage other; // opened beside it, when there is a backup that is offered
+  other.Opened(path, ReadProject(path), SessionStorage::FingerprintOf(path));
+  other.BackUp(Step(10), "ten", true);
+  other.Save(path, Step(10));
+  EXPECT_EQ(later(10), 0) << "it was offered";
+  first.BackUp(Step(3), "three", true);
+  first.BackUp(Step(4), "four", true);
+  other.BackUp(Step(11), "eleven", true);
+  other.Save(path, Step(11));
+  EXPECT_EQ(ReadProject(path).lastBackup.number, 6);
+  EXPECT_EQ(ReadProject(path).lastBackup.others, (std::set<int>{4, 5}));
+  EXPECT_EQ(later(11), 4);
+  // It was offered, and whoever saved did without.
+  SessionStorage next;
+  next.Opened(path, ReadProject(path), SessionStorage::FingerprintOf(path));
+  next.Save(path, Step(12));
+  EXPECT_EQ(later(12), 0);
+  // What was taken along to another name is of the same window.
+  const std::string moved = Path("q.json");
+  SessionStorage unsaved;
+  unsaved.BackUp(Step(20), "edit", true);
+  unsaved.Save(moved, Step(21));
+  unsaved.Save(moved, Step(22));
+  EXPECT_TRUE(ReadProject(moved).lastBackup.others.empty());
+}
+
+TEST_F(SessionOnDisk, ALargeNumberOfTheLastBackupLeavesRoomForMore)
+{
+  const std::string path = Path("p.json");
+  Project project = Step(1);
+  project.lastBackup = {"lineage", LargestNumber};
+  WriteProject(path, project);
+  SessionStorage storage;
+  storage.Opened(path, ReadProject(path), SessionStorage::FingerprintOf(path));
+  storage.BackUp(Step(2), "later", true);
+  EXPECT_EQ(Labels(storage), (std::vector<std::string>{"later"}));
+  EXPECT_NE(storage.LaterBackup(Step(1), {}), "");
+  project.lastBackup.number = LargestNumber + 1;
+  WriteProject(path, project);
+  EXPECT_THROW(ReadProject(path), Error);
+}
+
+TEST_F(SessionOnDisk, TheTruthAndPosesWithDisplacementsAreNotReplaced)
+{
+  SessionStorage storage;
+  Project project = Step(1);
+  project.truth = Path("truth.json");
+  Put(project.truth, "true");
+  EXPECT_THROW(storage.Save(project.truth, project), Error);
+  EXPECT_EQ(Text(project.truth), "true");
+  const SessionVolume& volume = project.state.volumes[0];
+  WritePoses(Path("bent.json"), {{volume.file, volume.geometry, volume.volumeToWorld, Path("bent.displacement-1.vti")}});
+  const std::string before = Text(Path("bent.json"));
+  EXPECT_THROW(storage.Save(Path("bent.json"), project), Error);
+  EXPECT_EQ(Text(Path("bent.json")), before);
+  WritePoses(Path("bent.json"), {{volume.file, volume.geometry, volume.volumeToWorld}});
+  storage.Save(Path("bent.json"), project);
+  EXPECT_TRUE(ReadProject(Path("bent.json")).state == project.state);
 }
 
 TEST_F(SessionOnDisk, TimesTellWhatIsLaterThanAFileThatKnowsNoBackup)
