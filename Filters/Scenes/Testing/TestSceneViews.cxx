@@ -2,8 +2,8 @@
 #include "Core/Base/Error.h"
 #include "Filters/Scenes/SceneViews.h"
 #include "Testing/TemporaryFolder.h"
-#include <fstream>
 #include <gtest/gtest.h>
+#include <sstream>
 
 using namespace echorama;
 using Eigen::Vector3d;
@@ -94,13 +94,14 @@ TEST(SceneViews, AMoveThereAndBackIsNotMissed)
 
 TEST_F(SceneRecordings, TimesSoLargeThatNothingLiesBetweenThemEnd)
 {
-  std::ofstream table(Path("path.csv"));
-  table << "time,x,y,z,qw,qx,qy,qz\n" << std::fixed;
+  std::ostringstream frames;
+  frames << "ObjectType = Image\nNDims = 3\nDimSize = 1 1 10\nElementType = MET_UCHAR\n" << std::fixed;
   for (int i = 0; i < 10; ++i) // neighbouring numbers are 2 s apart there
-    table << 1e16 + 2.0 * i << "," << 10 * i << ",0,0,1,0,0,0\n";
-  table.close();
+    frames << "Seq_Frame000" << i << "_Timestamp = " << 1e16 + 2.0 * i << "\nSeq_Frame000" << i
+           << "_ProbeToTrackerTransform = 1 0 0 " << 10 * i << " 0 1 0 0 0 0 1 0 0 0 0 1\n";
+  Put("path.igs.mha", frames.str() + "ElementDataFile = LOCAL\n0123456789");
   SynthesisScene scene = Parse(R"("gel": {}, "views": {"recording":
-    {"file": "path.csv", "smoothSeconds": 0, "longestGapSeconds": 600, "count": 2, "stepMm": 1}})");
+    {"file": "path.igs.mha", "smoothSeconds": 0, "longestGapSeconds": 600, "count": 2, "stepMm": 1}})");
   scene.folder = folder.string();
   const auto views = ViewsOf(scene);
   ASSERT_EQ(views.size(), 2u);
