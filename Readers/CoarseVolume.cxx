@@ -19,14 +19,14 @@ public:
     Note("one of " + NumberText(stride) + " voxels along each axis was read");
   }
 
-  void Read(std::size_t, void* voxels, unsigned char*, const Progress& progress) override
+  void Read(std::size_t index, void* voxels, unsigned char*, const Progress& progress) override
   {
-    ReadSlices(0, content_.geometry.dimensions[2], voxels, progress);
+    ReadSlices(index, 0, content_.geometry.dimensions[2], voxels, progress);
   }
 
   bool ReadsSlices() const override { return true; }
 
-  void ReadSlices(int first, int count, void* voxels, const Progress& progress) override
+  void ReadSlices(std::size_t index, int first, int count, void* voxels, const Progress& progress) override
   {
     const auto &n = content_.geometry.dimensions, &all = whole_->Content().geometry.dimensions;
     const std::size_t size = SizeOf(content_.type), stride = static_cast<std::size_t>(stride_),
@@ -35,7 +35,7 @@ public:
     auto* to = static_cast<unsigned char*>(voxels);
     for (int k = 0; k < count; ++k) {
       progress(static_cast<double>(k) / count);
-      whole_->ReadSlices((first + k) * stride_, 1, slice.data());
+      whole_->ReadSlices(index, (first + k) * stride_, 1, slice.data());
       for (std::size_t j = 0; j < static_cast<std::size_t>(n[1]); ++j)
         for (std::size_t i = 0; i < static_cast<std::size_t>(n[0]); ++i, to += size)
           std::memcpy(to, &slice[(j * row + i * size) * stride], size);

@@ -103,9 +103,9 @@ public:
     ReadPart(index, 0, stored_.geometry.dimensions[2], voxels, progress);
   }
   bool ReadsSlices() const override { return true; }
-  void ReadSlices(int first, int count, void* voxels, const Progress& progress) override
+  void ReadSlices(std::size_t index, int first, int count, void* voxels, const Progress& progress) override
   {
-    ReadPart(0, first, count, voxels, progress);
+    ReadPart(index, first, count, voxels, progress);
   }
 
 private:

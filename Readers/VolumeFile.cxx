@@ -110,7 +110,7 @@ public:
 
   bool ReadsSlices() const override { return header_.encoding != ImageHeader::Encoding::Text; }
 
-  void ReadSlices(int first, int count, void* voxels, const Progress& progress) override
+  void ReadSlices(std::size_t, int first, int count, void* voxels, const Progress& progress) override
   {
     ImageHeader part = header_;
     part.geometry.dimensions[2] = count;

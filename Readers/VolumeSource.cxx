@@ -13,7 +13,7 @@
 
 namespace echorama {
 
-void VolumeSource::ReadSlices(int, int, void*, const Progress&)
+void VolumeSource::ReadSlices(std::size_t, int, int, void*, const Progress&)
 {
   Fail("its slices cannot be read one by one");
 }

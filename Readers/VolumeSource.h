@@ -57,10 +57,11 @@ public:
   /// Whether ReadSlices() holds no more than it is asked for.
   virtual bool ReadsSlices() const { return false; }
 
-  /// Writes the slices [first, first + count) of volume 0 to \a voxels, those that Read() would; only where it ReadsSlices().
+  /// Writes the slices [first, first + count) of volume \a index to \a voxels, those that Read() would; only where it
+  /// ReadsSlices().
   /// Where the file is compressed, slices in ascending order take one way through it, and others begin anew.
   /// \throws as Read().
-  virtual void ReadSlices(int first, int count, void* voxels, const Progress& progress = {});
+  virtual void ReadSlices(std::size_t index, int first, int count, void* voxels, const Progress& progress = {});
 
   /// Writes the samples of volume \a index to \a samples; only where the content has beams.
   virtual void ReadBeams(std::size_t index, void* samples, const Progress& progress = {});

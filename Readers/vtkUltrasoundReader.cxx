@@ -426,7 +426,7 @@ bool vtkUltrasoundReader::ReadSlices(vtkImageData* output, const echorama::Progr
   const auto read = [&](VolumeSource& source, const char* name, const echorama::Progress& part) {
     CheckRoom(source.Content(), slices);
     const auto values = NewArray(source.Content().type, static_cast<std::size_t>(output->GetNumberOfPoints()), name);
-    source.ReadSlices(wanted[4] - whole[4], slices, values->GetVoidPointer(0), part);
+    source.ReadSlices(0, wanted[4] - whole[4], slices, values->GetVoidPointer(0), part);
     return values;
   };
   output->GetPointData()->SetScalars(read(*files->Main, vtkUltrasoundVolume::IntensityName(), progress.Part(0.0, 0.7)));

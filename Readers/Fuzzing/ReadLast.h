@@ -17,14 +17,15 @@ inline void ReadLast(VolumeSource& source)
     return;
   std::vector<double> voxels(count), parts(count); // wide and aligned enough for every type
   std::vector<unsigned char> valid(count);
-  source.Read(content.Volumes() - 1, voxels.data(), valid.data());
-  if (!source.ReadsSlices() || content.Volumes() > 1)
+  const std::size_t last = content.Volumes() - 1;
+  source.Read(last, voxels.data(), valid.data());
+  if (!source.ReadsSlices())
     return;
   const int slices = content.geometry.dimensions[2], middle = slices / 2;
   const std::size_t bytes = count * SizeOf(content.type);
-  source.ReadSlices(middle, slices - middle, reinterpret_cast<char*>(parts.data()) + bytes / slices * middle);
+  source.ReadSlices(last, middle, slices - middle, reinterpret_cast<char*>(parts.data()) + bytes / slices * middle);
   if (middle > 0) // goes back
-    source.ReadSlices(0, middle, parts.data());
+    source.ReadSlices(last, 0, middle, parts.data());
   if (std::memcmp(voxels.data(), parts.data(), bytes) != 0)
     std::abort();
 }

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <numeric>
 
 using namespace echorama;
 using namespace echorama::testing;
@@ -296,7 +297,7 @@ TEST_F(NiftiFile, SlicesAreThoseOfTheWhole)
           ASSERT_TRUE(source->ReadsSlices());
           for (const auto& [first, count] : {std::pair{0, 2}, {2, 3}, {8, 1}, {5, 4}, {0, 9}}) {
             std::vector<T> part(6 * static_cast<std::size_t>(count) + 1, T(4711));
-            source->ReadSlices(first, count, part.data(), {});
+            source->ReadSlices(0, first, count, part.data(), {});
             EXPECT_TRUE(std::equal(part.begin(), part.end() - 1, whole.begin() + 6 * first)) << first << " " << count;
             EXPECT_EQ(part.back(), T(4711));
           }
@@ -366,6 +367,32 @@ TEST_F(NiftiFile, TimeSeries)
   file.units = 2 | 8;
   file.pixdim[4] = 1e-30f;
   Refused(file, "do not increase");
+}
+
+TEST_F(NiftiFile, EveryVolumeOfASeriesCanBeReadCoarsely)
+{
+  ByHand file;
+  file.dim = {4, 3, 1, 5, 3, 1, 1, 1};
+  file.pixdim[4] = 1;
+  file.data.resize(45);
+  std::iota(file.data.begin(), file.data.end(), '\0');
+  VolumeReadParameters coarsely;
+  coarsely.stride = 2;
+  for (const float z : {1.0f, -1.0f}) // left-handed: slices are taken in reverse
+    for (const bool compressed : {false, true}) {
+      file.srow[10] = z;
+      const std::string path = Put("a.nii", compressed ? Gzip(file.File()) : file.File());
+      const auto whole = OpenVolume(path), coarse = OpenVolume(path, coarsely);
+      for (const std::size_t index : {1, 2, 0, 2}) {
+        const std::vector<char> all = Voxels<char>(*whole, index), wanted{all[0], all[2], all[6], all[8], all[12], all[14]};
+        EXPECT_EQ(Voxels<char>(*coarse, index), wanted) << index;
+        std::vector<char> slices(4);
+        coarse->ReadSlices(index, 1, 2, slices.data());
+        EXPECT_TRUE(std::equal(slices.begin(), slices.end(), wanted.begin() + 2)) << index;
+        whole->ReadSlices(index, 2, 1, slices.data());
+        EXPECT_EQ(slices[0], all[6]) << index;
+      }
+    }
 }
 
 TEST_F(NiftiFile, PairsOfHeaderAndImage)

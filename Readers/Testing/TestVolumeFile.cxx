@@ -313,7 +313,7 @@ TEST_F(VolumeFile, SlicesAreThoseOfTheWhole)
     ASSERT_TRUE(source->ReadsSlices());
     for (const auto& [first, count] : {std::pair{0, 2}, {2, 3}, {5, 6}, {4, 1}, {10, 1}, {0, 11}, {3, 3}}) { // on, back, and over
       std::vector<std::uint16_t> part(slice * static_cast<std::size_t>(count) + 1, 4711);
-      source->ReadSlices(first, count, part.data());
+      source->ReadSlices(0, first, count, part.data());
       EXPECT_TRUE(std::equal(part.begin(), part.end() - 1, whole.begin() + static_cast<std::ptrdiff_t>(slice) * first))
           << first << " " << count;
       EXPECT_EQ(part.back(), 4711);
@@ -333,13 +333,13 @@ TEST_F(VolumeFile, SlicesAreThoseOfTheWhole)
           wanted.push_back(whole[(k * 5 + j) * 7 + i]);
     coarse->Read(0, found.data(), nullptr);
     EXPECT_EQ(found, wanted);
-    coarse->ReadSlices(1, 2, some.data());
+    coarse->ReadSlices(0, 1, 2, some.data());
     EXPECT_TRUE(std::equal(some.begin(), some.end(), wanted.begin() + 6));
   }
   Put("text.nrrd", "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 1 1 2\nencoding: ascii\n\n1 2\n");
   const auto text = OpenVolume(Path("text.nrrd"));
   EXPECT_FALSE(text->ReadsSlices());
-  EXPECT_THROW(text->ReadSlices(0, 1, nullptr), Error);
+  EXPECT_THROW(text->ReadSlices(0, 0, 1, nullptr), Error);
   VolumeReadParameters coarsely;
   coarsely.stride = 2;
   ExpectRefused([&] { OpenVolume(Path("text.nrrd"), coarsely); }, Error::Kind::NotPossible, Path("text.nrrd"), "Stride");
