@@ -30,12 +30,14 @@ public:
   {
     const auto &n = content_.geometry.dimensions, &all = whole_->Content().geometry.dimensions;
     const std::size_t size = SizeOf(content_.type), stride = static_cast<std::size_t>(stride_),
-                      row = static_cast<std::size_t>(all[0]) * size;
+                      row = static_cast<std::size_t>(all[0]) * size,
+                      bytes = static_cast<std::size_t>(n[0]) * static_cast<std::size_t>(n[1]) * size;
     std::vector<unsigned char> slice(row * static_cast<std::size_t>(all[1]));
-    auto* to = static_cast<unsigned char*>(voxels);
-    for (int k = 0; k < count; ++k) {
-      progress(static_cast<double>(k) / count);
+    for (int done = 0; done < count; ++done) {
+      progress(static_cast<double>(done) / count);
+      const int k = content_.lastSliceFirst ? count - 1 - done : done; // forwards through the file
       whole_->ReadSlices(index, (first + k) * stride_, 1, slice.data());
+      auto* to = static_cast<unsigned char*>(voxels) + static_cast<std::size_t>(k) * bytes;
       for (std::size_t j = 0; j < static_cast<std::size_t>(n[1]); ++j)
         for (std::size_t i = 0; i < static_cast<std::size_t>(n[0]); ++i, to += size)
           std::memcpy(to, &slice[(j * row + i * size) * stride], size);

@@ -315,6 +315,7 @@ void NiftiSource::ReadGeometry(const NiftiHeader& fields)
   for (const std::string& note : stored_.notes)
     Note(note);
   content_.geometry = stored_.geometry;
+  content_.lastSliceFirst = stored_.reverseSlices;
 }
 
 void NiftiSource::ReadExtensions(PlainOrGzip& file, std::uint64_t at, bool swap)

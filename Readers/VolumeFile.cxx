@@ -98,6 +98,7 @@ public:
     CheckContent(header_);
     content_.format = header_.format;
     content_.geometry = header_.geometry;
+    content_.lastSliceFirst = header_.reverseSlices;
     content_.type = header_.type;
     content_.fields = header_.fields;
     content_.notes = header_.notes;

@@ -28,6 +28,7 @@ struct VolumeContent {
   VoxelType type = VoxelType::UInt8; ///< one number per voxel
   std::vector<double> times;         ///< seconds, increasing, one per volume of a time series; empty for a single volume
   bool holdsValidRegion = false;     ///< Read() says which voxels are real
+  bool lastSliceFirst = false;       ///< the slices lie in the file in reverse
   std::optional<ProbeGeometry> probe;
   std::optional<Pose> probeToWorld;
   std::optional<double> timeStamp;  ///< seconds
@@ -58,9 +59,8 @@ public:
   virtual bool ReadsSlices() const { return false; }
 
   /// Writes the slices [first, first + count) of volume \a index to \a voxels, those that Read() would; only where it
-  /// ReadsSlices().
-  /// Where the file is compressed, slices in ascending order take one way through it, and others begin anew.
-  /// \throws as Read().
+  /// ReadsSlices(). Where the file is compressed, slices in its order (descending ones where the content is lastSliceFirst) take
+  /// one way through it, and others begin anew. \throws as Read().
   virtual void ReadSlices(std::size_t index, int first, int count, void* voxels, const Progress& progress = {});
 
   /// Writes the samples of volume \a index to \a samples; only where the content has beams.

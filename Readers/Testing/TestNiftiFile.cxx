@@ -2,6 +2,7 @@
 #include "Core/Base/Random.h"
 #include "Readers/Compression.h"
 #include "Readers/NiftiFile.h"
+#include "Readers/Testing/Effort.h"
 #include "Readers/Testing/ObliqueVolume.h"
 #include "Readers/VolumeFile.h"
 #include "Readers/VolumeWriter.h"
@@ -393,6 +394,27 @@ TEST_F(NiftiFile, EveryVolumeOfASeriesCanBeReadCoarsely)
         EXPECT_EQ(slices[0], all[6]) << index;
       }
     }
+}
+
+TEST_F(NiftiFile, ReadingCoarselyTakesOneWayThroughACompressedFile)
+{
+  ByHand file;
+  file.dim = {4, 64, 64, 41, 2, 1, 1, 1};
+  file.pixdim[4] = 1;
+  const std::vector<std::uint8_t> random = Values<std::uint8_t>(2 * 64 * 64 * 41); // compressing makes them no fewer
+  file.data.assign(random.begin(), random.end());
+  VolumeReadParameters coarsely;
+  coarsely.stride = 2;
+  for (const float z : {1.0f, -1.0f}) { // left-handed: slices are taken in reverse
+    file.srow[10] = z;
+    const auto coarse = OpenVolume(Put("a.nii.gz", Gzip(file.File())), coarsely);
+    std::vector<std::uint8_t> found(32 * 32 * 21);
+    const std::uint64_t read = BytesRead([&] {
+      for (const std::size_t index : {0, 1})
+        coarse->Read(index, found.data(), nullptr);
+    });
+    EXPECT_LT(read, 2 * file.data.size()) << z;
+  }
 }
 
 TEST_F(NiftiFile, PairsOfHeaderAndImage)

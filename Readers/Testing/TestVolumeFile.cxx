@@ -6,6 +6,7 @@
 #include "Readers/ByteOrder.h"
 #include "Readers/Compression.h"
 #include "Readers/DataFile.h"
+#include "Readers/Testing/Effort.h"
 #include "Readers/Testing/ObliqueVolume.h"
 #include "Readers/VolumeFile.h"
 #include "Readers/VolumeSource.h"
@@ -345,6 +346,25 @@ TEST_F(VolumeFile, SlicesAreThoseOfTheWhole)
   ExpectRefused([&] { OpenVolume(Path("text.nrrd"), coarsely); }, Error::Kind::NotPossible, Path("text.nrrd"), "Stride");
   coarsely.stride = 0;
   EXPECT_EQ(OpenVolume(Path("text.nrrd"), coarsely)->Content().geometry.dimensions, (std::array<int, 3>{1, 1, 2}));
+}
+
+TEST_F(VolumeFile, ReadingCoarselyTakesOneWayThroughACompressedFile)
+{
+  std::string bytes(64 * 64 * 41, '\0');
+  const std::vector<std::uint8_t> random = Values<std::uint8_t>(bytes.size()); // compressing makes them no fewer
+  std::copy(random.begin(), random.end(), bytes.begin());
+  VolumeReadParameters coarsely;
+  coarsely.stride = 2;
+  for (const std::string z : {"1", "-1"}) { // left-handed: slices are taken in reverse
+    const std::string path = Put("a.mha", "NDims = 3\nTransformMatrix = 1 0 0 0 1 0 0 0 " + z +
+                                              "\nDimSize = 64 64 41\nElementType = MET_UCHAR\nCompressedData = True\n"
+                                              "ElementDataFile = LOCAL\n" +
+                                              Zlib(bytes));
+    const auto coarse = OpenVolume(path, coarsely);
+    std::vector<std::uint8_t> found(32 * 32 * 21);
+    EXPECT_LT(BytesRead([&] { coarse->Read(0, found.data(), nullptr); }), 2 * bytes.size()) << z;
+    EXPECT_LT(BytesRead([&] { coarse->ReadSlices(0, 1, 20, found.data()); }), 2 * bytes.size()) << z;
+  }
 }
 
 TEST_F(VolumeFile, StrideZeroLeavesAVolumeForAFirstLook)
