@@ -246,6 +246,7 @@ void NiftiSource::ReadTimes(const NiftiHeader& fields)
     Note("the file does not name the unit of its time steps: seconds were assumed");
   if (!std::isfinite(start))
     start = 0.0;
+  content_.times.reserve(static_cast<std::size_t>(volumes_));
   for (std::int64_t i = 0; i < volumes_; ++i)
     content_.times.push_back(start + static_cast<double>(i) * step);
   if (!(content_.times[0] < content_.times[1]) || !std::isfinite(content_.times.back()))
@@ -405,6 +406,9 @@ void NiftiSource::CheckSizes()
       "its dimensions (" + SizeText(d) + (volumes_ > 1 ? ", " + std::to_string(volumes_) + " volumes" : "") + ")";
   PlainOrGzip& data = Data();
   CheckBytes(stored_.dataPath, says, bytes, data.FileBytes(), data.Compressed(), true);
+  // A list of times costs memory per volume. Few are always possible: as many as NIfTI-1 can have.
+  if (static_cast<double>(volumes_) > std::max(32767.0, data.FileBytes()))
+    Fail("it says that it has " + std::to_string(volumes_) + " volumes, more than the bytes of the file");
   data.SetTotal(static_cast<std::uint64_t>(bytes));
 }
 

@@ -396,6 +396,36 @@ TEST_F(NiftiFile, EveryVolumeOfASeriesCanBeReadCoarsely)
     }
 }
 
+TEST_F(NiftiFile, VolumesAreNoMoreThanTheFileCanHold)
+{
+  ByHand file;
+  file.dim = {4, 1, 1, 1, 30000, 1, 1, 1};
+  file.pixdim[4] = 1;
+  file.data.assign(30000, '\0');
+  const std::string packed = Gzip(file.File());
+  ASSERT_LT(packed.size(), 1000u);
+  EXPECT_EQ(OpenNifti(Put("few.nii.gz", packed))->Content().Volumes(), 30000u); // a few may always be
+
+  // NIfTI-2: a million voxels would fit into so many compressed bytes, but their times would not.
+  std::string h(544, '\0');
+  const auto put = [&](std::size_t at, auto value) { h.replace(at, sizeof value, file.Number(value)); };
+  put(0, 540);
+  h.replace(4, 8, std::string("n+2\0\r\n\x1a\n", 8));
+  put(12, short{2});
+  put(14, short{8});
+  const std::array<std::int64_t, 8> dim{4, 1, 1, 1, 1000000, 1, 1, 1};
+  for (std::size_t i = 0; i < 8; ++i) {
+    put(16 + 8 * i, dim[i]);
+    put(104 + 8 * i, 1.0);
+  }
+  put(168, std::int64_t{544});
+  put(500, 10);
+  const std::string many = Put("many.nii.gz", Gzip(h + std::string(1000000, '\0')));
+  ExpectRefused([&] { OpenNifti(many); }, Error::Kind::BadFile, many, "1000000 volumes, more than the bytes of the file");
+  std::vector<std::uint8_t> random = Values<std::uint8_t>(1000000);
+  EXPECT_EQ(OpenNifti(Put("real.nii.gz", Gzip(h + std::string(random.begin(), random.end()))))->Content().Volumes(), 1000000u);
+}
+
 TEST_F(NiftiFile, ReadingCoarselyTakesOneWayThroughACompressedFile)
 {
   ByHand file;
