@@ -12,6 +12,7 @@
 
 #include <jpeglib.h>
 #include <png.h>
+#include <sys/stat.h>
 #include <tiffio.h>
 
 namespace echorama {
@@ -173,14 +174,72 @@ int TiffWarning(TIFF*, void*, const char*, const char*, va_list)
   return 1;
 }
 
+using FilePointer = std::unique_ptr<FILE, int (*)(FILE*)>;
+
+FilePointer OpenPicture(const std::string& path)
+{
+  FilePointer file(std::fopen(path.c_str(), "rb"), std::fclose);
+  if (!file)
+    throw Error(Error::Kind::FileSystem, path + ": it cannot be opened (is reading permitted?)");
+  return file;
+}
+
+// A file as libtiff sees it. To find a page it would go through all pages, each time a file is opened anew; so the header names
+// the page that is wanted as the first.
+struct TiffFile {
+  FILE* file;
+  std::array<unsigned char, 16> header{}; // BigTIFF's, or the shorter one and what follows
+  std::size_t length = 0;                 // of what is changed
+
+  TiffFile(FILE* opened, std::uint64_t page) : file(opened)
+  {
+    std::setvbuf(file, nullptr, _IONBF, 0); // libtiff reads what it needs, here and there
+    if (page == 0)
+      return;
+    length = std::fread(header.data(), 1, header.size(), file);
+    std::rewind(file);
+    const bool bigEndian = header[0] == 'M';
+    const std::size_t bytes = header[bigEndian ? 3 : 2] == 43 ? 8 : 4; // 43: BigTIFF
+    for (std::size_t i = 0; i < bytes; ++i)
+      header[bytes + i] = static_cast<unsigned char>(page >> 8 * (bigEndian ? bytes - 1 - i : i));
+  }
+};
+
+tmsize_t ReadTiffBytes(thandle_t handle, void* out, tmsize_t size)
+{
+  const TiffFile& tiff = *static_cast<TiffFile*>(handle);
+  const std::size_t at = static_cast<std::size_t>(ftello(tiff.file)),
+                    there = std::fread(out, 1, static_cast<std::size_t>(size), tiff.file);
+  if (at < tiff.length)
+    std::memcpy(out, &tiff.header[at], std::min(there, tiff.length - at));
+  return static_cast<tmsize_t>(there);
+}
+
+toff_t SeekTiff(thandle_t handle, toff_t offset, int from)
+{
+  FILE* const file = static_cast<TiffFile*>(handle)->file;
+  return fseeko(file, static_cast<off_t>(offset), from) == 0 ? static_cast<toff_t>(ftello(file)) : static_cast<toff_t>(-1);
+}
+
+toff_t SizeOfTiff(thandle_t handle)
+{
+  struct stat status {};
+  return fstat(fileno(static_cast<TiffFile*>(handle)->file), &status) == 0 ? static_cast<toff_t>(status.st_size) : 0;
+}
+
 using TiffPointer = std::unique_ptr<TIFF, void (*)(TIFF*)>;
 
-TiffPointer OpenTiff(const std::string& path, PictureInfo* info)
+// Both \a file and \a info must outlive it.
+TiffPointer OpenTiff(const std::string& path, TiffFile& file, PictureInfo* info)
 {
   TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
   TIFFOpenOptionsSetErrorHandlerExtR(options, TiffError, info);
   TIFFOpenOptionsSetWarningHandlerExtR(options, TiffWarning, nullptr);
-  TiffPointer tiff(TIFFOpenExt(path.c_str(), "rm", options), TIFFClose); // m: not mapped, so that a shrinking file is no crash
+  const auto write = [](thandle_t, void*, tmsize_t) { return tmsize_t{0}; };
+  const auto close = [](thandle_t) { return 0; };
+  TiffPointer tiff(TIFFClientOpenExt(path.c_str(), "rm", &file, ReadTiffBytes, write, SeekTiff, close, SizeOfTiff, nullptr,
+                                     nullptr, options), // m: not mapped, so that a shrinking file is no crash
+                   TIFFClose);
   TIFFOpenOptionsFree(options);
   return tiff;
 }
@@ -283,14 +342,12 @@ void ReadPicture(Picture& picture)
 {
   bool good = false;
   picture.info.message[0] = '\0';
+  const FilePointer file = OpenPicture(picture.path);
   if (picture.kind == PictureKind::Tiff) {
-    const TiffPointer tiff = OpenTiff(picture.path, &picture.info);
-    good =
-        tiff && (picture.page == 0 || TIFFSetSubDirectory(tiff.get(), picture.page)) && ReadTiffPage(tiff.get(), &picture.info);
+    TiffFile source(file.get(), picture.page);
+    const TiffPointer tiff = OpenTiff(picture.path, source, &picture.info);
+    good = tiff && ReadTiffPage(tiff.get(), &picture.info);
   } else {
-    const std::unique_ptr<FILE, int (*)(FILE*)> file(std::fopen(picture.path.c_str(), "rb"), std::fclose);
-    if (!file)
-      throw Error(Error::Kind::FileSystem, picture.path + ": it cannot be opened (is reading permitted?)");
     good = picture.kind == PictureKind::Png ? ReadPng(file.get(), &picture.info) : ReadJpeg(file.get(), &picture.info);
   }
   if (!good)
@@ -301,7 +358,9 @@ void ReadPicture(Picture& picture)
 TiffPages ReadTiffPages(const std::string& path)
 {
   PictureInfo info{};
-  const TiffPointer tiff = OpenTiff(path, &info);
+  const FilePointer file = OpenPicture(path);
+  TiffFile source(file.get(), 0);
+  const TiffPointer tiff = OpenTiff(path, source, &info);
   if (!tiff)
     FailFile(path, "the image cannot be read (" + std::string(info.message) + ")");
   TiffPages found;
