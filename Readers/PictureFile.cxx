@@ -74,6 +74,9 @@ bool ReadPng(FILE* file, PictureInfo* info)
 }
 
 //------------------------------------------------------------------------------------------------ JPEG
+// Each scan passes over the whole picture, however few bytes it has; programs make about ten.
+constexpr int MostScans = 500;
+
 struct JpegErrors {
   jpeg_error_mgr manager; // first: libjpeg knows this part
   jmp_buf jump;
@@ -85,6 +88,15 @@ void JpegError(j_common_ptr jpeg)
 }
 
 void JpegMessage(j_common_ptr) {}
+
+void LimitScans(j_common_ptr jpeg)
+{
+  if (reinterpret_cast<j_decompress_ptr>(jpeg)->input_scan_number <= MostScans)
+    return;
+  PictureInfo* info = static_cast<PictureInfo*>(jpeg->client_data);
+  std::snprintf(info->message, sizeof info->message, "it has more than %d scans", MostScans);
+  JpegError(jpeg);
+}
 
 // The orientation that Exif gives a picture, in the directory of a TIFF after six bytes of its own; 1 where it does not.
 unsigned ExifOrientation(const jpeg_marker_struct* marker)
@@ -111,14 +123,19 @@ bool ReadJpeg(FILE* file, PictureInfo* info)
   jpeg.err = jpeg_std_error(&errors.manager);
   errors.manager.error_exit = JpegError;
   errors.manager.output_message = JpegMessage;
+  jpeg_progress_mgr progress{};
+  progress.progress_monitor = LimitScans;
   if (setjmp(errors.jump)) {
     char text[JMSG_LENGTH_MAX];
     errors.manager.format_message(reinterpret_cast<j_common_ptr>(&jpeg), text);
-    std::snprintf(info->message, sizeof info->message, "%.190s", text);
+    if (info->message[0] == '\0') // else it says more
+      std::snprintf(info->message, sizeof info->message, "%.190s", text);
     jpeg_destroy_decompress(&jpeg);
     return false;
   }
   jpeg_create_decompress(&jpeg);
+  jpeg.progress = &progress;
+  jpeg.client_data = info;
   jpeg_stdio_src(&jpeg, file);
   jpeg_save_markers(&jpeg, JPEG_APP0 + 1, 0xFFFF);
   jpeg_read_header(&jpeg, TRUE);

@@ -36,6 +36,20 @@ protected:
   }
 };
 
+// A progressive JPEG of one grey block, whose frequencies come again and again: all zero.
+std::string ManyScans(int scans)
+{
+  const auto bytes = [](std::initializer_list<int> list) { return std::string(list.begin(), list.end()); };
+  std::string file = bytes({0xFF, 0xD8, 0xFF, 0xDB, 0, 67, 0}) + std::string(64, '\1');
+  file += bytes({0xFF, 0xC2, 0, 11, 8, 0, 8, 0, 8, 1, 1, 0x11, 0});
+  for (const int table : {0x00, 0x10}) // one code of one bit: no difference, and no more frequencies
+    file += bytes({0xFF, 0xC4, 0, 20, table, 1}) + std::string(16, '\0');
+  file += bytes({0xFF, 0xDA, 0, 8, 1, 1, 0, 0, 0, 0, 0x7F});
+  for (int scan = 1; scan < scans; ++scan)
+    file += bytes({0xFF, 0xDA, 0, 8, 1, 1, 0, 1, 63, 0, 0x7F});
+  return file + bytes({0xFF, 0xD9});
+}
+
 } // namespace
 
 TEST_F(PictureFile, PagesAreFoundInEveryKindOfTiff)
@@ -73,4 +87,20 @@ TEST_F(PictureFile, NoPageIsSoughtThroughAllOthers)
     }
   });
   EXPECT_LT(read, 4 * std::filesystem::file_size(path));
+}
+
+TEST_F(PictureFile, JpegOfTooManyScansIsRefused)
+{
+  unsigned char pixels[64];
+  const auto read = [&](int scans) {
+    Picture picture{Put("a.jpg", ManyScans(scans)), PictureKind::Jpeg};
+    picture.info.pixels = pixels;
+    picture.info.room = sizeof pixels;
+    ReadPicture(picture);
+  };
+  std::fill_n(pixels, 64, static_cast<unsigned char>(0));
+  read(500);
+  for (const unsigned char pixel : pixels)
+    EXPECT_EQ(pixel, 128);
+  ExpectRefused([&] { read(501); }, Error::Kind::BadFile, Path("a.jpg"), "more than 500 scans");
 }
