@@ -63,6 +63,11 @@ struct Sensor {
   std::array<int, 7> columns{}; // x y z, then w x y z of the quaternion
 };
 
+int FirstColumn(const Sensor& sensor)
+{
+  return *std::min_element(sensor.columns.begin(), sensor.columns.end());
+}
+
 // Where the numbers of a table stand; -1: nowhere.
 struct Columns {
   char separator = ',';
@@ -70,7 +75,8 @@ struct Columns {
   int time = -1, tool = -1, status = -1;
   std::array<int, 4> clock{-1, -1, -1, -1}; // hour, minutes, seconds, ms
   std::string repeated;                     // a column that is there several times, so that it belongs to nobody knows which tool
-  std::vector<Sensor> sensors;
+  std::vector<Sensor> sensors;              // in the order of their first columns
+  int last = -1;                            // of all sensors
 
   bool HasClock() const { return clock[0] >= 0 && clock[1] >= 0 && clock[2] >= 0; }
 };
@@ -131,11 +137,16 @@ std::optional<Columns> NamedColumns(const std::string& line)
   const std::string text = line.substr(first);
   columns.separator = SeparatorOf(text);
   bool closed = true;
+  const auto isFirstOfQuaternion = [](const std::string& name) {
+    const std::string begin = name.substr(0, 2);
+    return begin == "qw" || begin == "qo" || begin == "q0";
+  };
   std::map<std::string, int> at; // the first column of each name
   std::vector<std::string> names;
   for (const std::string& cell : Cells(text, columns.separator, closed)) {
     names.push_back(PlainName(cell));
-    at.emplace(names.back(), static_cast<int>(names.size()) - 1);
+    if (!at.emplace(names.back(), static_cast<int>(names.size()) - 1).second && isFirstOfQuaternion(names.back()))
+      columns.repeated = names.back();
   }
   const auto find = [&at](std::initializer_list<std::string> choices) {
     for (const std::string& name : choices)
@@ -145,20 +156,22 @@ std::optional<Columns> NamedColumns(const std::string& line)
   };
   std::set<std::string> known;
   for (const std::string& name : names) {
-    const std::string begin = name.substr(0, 2), end = name.size() > 2 ? name.substr(2) : "";
-    if (begin != "qw" && begin != "qo" && begin != "q0")
+    if (!isFirstOfQuaternion(name))
       continue;
-    if (std::count(names.begin(), names.end(), name) > 1)
-      columns.repeated = name;
+    const std::string end = name.substr(2);
     if (!known.insert(end).second)
       continue;
     const Sensor sensor{SensorName(end),
                         {find({"tx" + end, "x" + end}), find({"ty" + end, "y" + end}), find({"tz" + end, "z" + end}),
                          find({name}), find({"qx" + end, "q1" + end}), find({"qy" + end, "q2" + end}),
                          find({"qz" + end, "q3" + end})}};
-    if (*std::min_element(sensor.columns.begin(), sensor.columns.end()) >= 0)
-      columns.sensors.push_back(sensor);
+    if (FirstColumn(sensor) < 0)
+      continue;
+    columns.sensors.push_back(sensor);
+    columns.last = std::max(columns.last, *std::max_element(sensor.columns.begin(), sensor.columns.end()));
   }
+  std::stable_sort(columns.sensors.begin(), columns.sensors.end(),
+                   [](const Sensor& a, const Sensor& b) { return FirstColumn(a) < FirstColumn(b); });
   if (columns.sensors.empty() || !closed)
     return std::nullopt;
   columns.time = find({"time", "timestamp", "t"});
@@ -365,9 +378,12 @@ private:
 
   void TakeSensors(const ToolPose& moment)
   {
-    if (cells_.size() <= LastColumn())
+    const int cells = static_cast<int>(cells_.size());
+    if (cells <= columns_.last)
       faults_.Add("the row ends early; its complete values were read", number_);
     for (const Sensor& sensor : columns_.sensors) {
+      if (FirstColumn(sensor) >= cells)
+        break; // so do all that follow
       ToolPose pose = moment;
       std::array<double, 7> numbers{};
       bool whole = true;
@@ -376,28 +392,20 @@ private:
         whole = number.has_value();
         numbers[i] = number.value_or(NaN);
       }
-      if (!whole || (columns_.tool >= static_cast<int>(cells_.size())))
+      if (!whole || columns_.tool >= cells)
         continue;
       if (columns_.tool >= 0)
         pose.name = ToolTransformName(cells_[static_cast<std::size_t>(columns_.tool)]);
       else
         pose.name = sensor.name;
       SetPose(pose, numbers);
-      if (columns_.status >= 0 && columns_.status < static_cast<int>(cells_.size()) && pose.status == TransformStatus::Valid)
+      if (columns_.status >= 0 && columns_.status < cells && pose.status == TransformStatus::Valid)
         pose.status = TransformStatusOf(cells_[static_cast<std::size_t>(columns_.status)]);
       if (pose.status == TransformStatus::Missing)
         pose.pose = Pose::Identity();
       AddTool(pose.name);
       log_.poses.push_back(pose);
     }
-  }
-
-  std::size_t LastColumn() const
-  {
-    int last = 0;
-    for (const Sensor& sensor : columns_.sensors)
-      last = std::max(last, *std::max_element(sensor.columns.begin(), sensor.columns.end()));
-    return static_cast<std::size_t>(last);
   }
 
   void SetPose(ToolPose& pose, const std::array<double, 7>& numbers)
@@ -462,14 +470,14 @@ PoseLog ReadSequencePoses(const std::string& path, const PoseLogOptions& options
       faults.Add("the frame has no time; its poses were skipped", index);
       continue;
     }
+    const std::map<std::string, std::string> fields(frame.fields.begin(), frame.fields.end());
     for (const SequenceTransform& transform : frame.transforms) {
       ToolPose pose;
       pose.name = transform.name;
       pose.time = time;
       pose.status = transform.status;
-      for (const auto& [key, value] : frame.fields)
-        if (key == transform.name + ArrivalField)
-          ParseNumber(value, pose.arrival);
+      if (const auto arrival = fields.find(transform.name + ArrivalField); arrival != fields.end())
+        ParseNumber(arrival->second, pose.arrival);
       if (pose.status != TransformStatus::Missing) {
         seen.insert(pose.name);
         Eigen::Matrix4d matrix = transform.matrix.matrix();

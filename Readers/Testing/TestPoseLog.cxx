@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "Readers/PoseLog.h"
 #include "Readers/SequenceWriter.h"
+#include "Readers/Testing/Effort.h"
 #include "Testing/TemporaryFolder.h"
 #include <cmath>
 
@@ -54,6 +55,62 @@ std::string Identity(const std::string& x)
 }
 
 } // namespace
+
+// Files that are made to cost time: 16 times as much of them must not cost 256 times the effort.
+TEST_F(PoseLogFile, EffortGrowsWithTheLengthOfTheFile)
+{
+  const auto columns = [this](int size) {
+    std::string text;
+    for (int i = 0; i < 1000 * size; ++i)
+      text += "q0,";
+    return Put("columns" + std::to_string(size), text + "time\n1\n");
+  };
+  const auto sensors = [this](int size) { // and rows that end before the second
+    std::string text = "time", rows;
+    for (int i = 0; i < 100 * size; ++i)
+      for (const char* name : {"x", "y", "z", "qw", "qx", "qy", "qz"})
+        text += std::string(",") + name + std::to_string(i);
+    for (int i = 0; i < 1000 * size; ++i)
+      rows += "\n" + std::to_string(i) + ",1,2,3,1,0,0,0";
+    return Put("sensors" + std::to_string(size), text + rows + "\n");
+  };
+  const auto arrivals = [this](int size) {
+    std::string text = "NDims = 3\nDimSize = 0 0 1\nElementType = MET_OTHER\nKinds = domain domain list\n";
+    for (int i = 0; i < 500 * size; ++i) {
+      const std::string key = "Seq_Frame0000_A" + std::to_string(i) + "ToB";
+      text += key + "Transform = 1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n" + key + "Arrival = 3\n";
+    }
+    return Put("arrivals" + std::to_string(size), text + "Seq_Frame0000_Timestamp = 2\nElementDataFile = LOCAL\n");
+  };
+  const auto seconds = [](const std::string& path) {
+    return ProcessorSeconds([&] {
+      try {
+        ReadPoseLog(path);
+      } catch (const Error&) { // columns alone are no log
+      }
+    });
+  };
+  EXPECT_LT(seconds(columns(16)), 64 * seconds(columns(1)));
+  EXPECT_LT(seconds(sensors(16)), 64 * seconds(sensors(1)));
+  EXPECT_LT(seconds(arrivals(16)), 64 * seconds(arrivals(1)));
+  EXPECT_EQ(ReadPoseLog(Path("sensors1")).poses.size(), 1000u);
+  EXPECT_EQ(ReadPoseLog(Path("arrivals1")).poses.back().arrival, 3.0);
+}
+
+TEST_F(PoseLogFile, SensorsComeInTheOrderOfTheirFirstColumns)
+{
+  // Their columns lie among each other; the second row ends within both, and the third before the first's quaternion.
+  const PoseLog log = Read("time,xb,yb,zb,xa,ya,za,qoa,qxa,qya,qza,qob,qxb,qyb,qzb\n"
+                           "1,1,2,3,4,5,6,1,0,0,0,1,0,0,0\n"
+                           "2,1,2,3,4,5,6,1,0,0,0,1\n"
+                           "3,1,2,3\n");
+  EXPECT_EQ(log.tools, (std::vector<std::string>{"SensorBToTracker", "SensorAToTracker"}));
+  ASSERT_EQ(log.poses.size(), 3u);
+  EXPECT_EQ(log.poses[0].name, "SensorBToTracker");
+  EXPECT_EQ(log.poses[2].name, "SensorAToTracker");
+  EXPECT_TRUE(HasNote(log, "line 3 and 1 more: the row ends early"));
+  Refused("time,x,y,z,qw,qx,qy,qz\n1,1,no\n", "\"no\" is not a number"); // though it ends early
+}
 
 TEST_F(PoseLogFile, PlainTable)
 {
