@@ -119,11 +119,11 @@ public:
     return std::make_pair(begin, end);
   }
 
-  const Value* Find(std::int32_t frame, std::uint32_t name) const
+  // That of a frame, where all have one name; or nullptr.
+  const Value* Only(std::int32_t frame) const
   {
     const auto [begin, end] = Of(frame);
-    const auto found = std::find_if(begin, end, [name](const auto& e) { return e.name == name; });
-    return found == end ? nullptr : &found->value;
+    return begin == end ? nullptr : &begin->value;
   }
 
 private:
@@ -375,6 +375,7 @@ void SequenceFile::Parts::NoteFaults()
   std::map<std::pair<std::uint32_t, std::string>, Fault> faults;
   std::vector<int> valid(names.Count(), 0);
   std::vector<bool> listed(names.Count(), false);
+  std::vector<int> badly(names.Count(), -1); // in which frame each was last said not to be valid
   auto status = statuses.All().begin();
   for (const auto& [frame, name, matrix] : matrices.All()) {
     if (!listed[name]) {
@@ -383,12 +384,10 @@ void SequenceFile::Parts::NoteFaults()
     }
     if (matrix.fault)
       ++faults.try_emplace({name, matrix.fault}, Fault{frame}).first->second.count;
-    while (status != statuses.All().end() && status->frame < frame)
-      ++status;
-    bool good = !matrix.fault;
-    for (auto s = status; s != statuses.All().end() && s->frame == frame; ++s)
-      good = good && (s->name != name || TransformStatusOf(names[s->value]) == TransformStatus::Valid);
-    valid[name] += good;
+    for (; status != statuses.All().end() && status->frame <= frame; ++status)
+      if (TransformStatusOf(names[status->value]) != TransformStatus::Valid)
+        badly[status->name] = status->frame;
+    valid[name] += !matrix.fault && badly[name] != frame;
   }
   for (const auto& [what, fault] : faults)
     content.notes.push_back(names[what.first] + "Transform was taken as INVALID in frame " + std::to_string(fault.first) +
@@ -461,15 +460,19 @@ SequenceFrame SequenceFile::Frame(int index) const
   const Parts& p = *parts_;
   SequenceFrame frame;
   frame.time = Time(index);
-  if (const std::uint32_t* status = p.imageStatus.Find(index, 0))
+  if (const std::uint32_t* status = p.imageStatus.Only(index))
     frame.imageValid = Upper(p.names[*status]) == "OK";
   frame.imageValid = frame.imageValid && p.content.HasImages();
+  std::unordered_map<std::uint32_t, std::uint32_t> statuses;
+  const auto [firstStatus, lastStatus] = p.statuses.Of(index);
+  for (auto entry = firstStatus; entry != lastStatus; ++entry)
+    statuses.emplace(entry->name, entry->value);
   const auto [begin, end] = p.matrices.Of(index);
   for (auto entry = begin; entry != end; ++entry) {
     SequenceTransform transform;
     transform.name = p.names[entry->name];
-    if (const std::uint32_t* status = p.statuses.Find(index, entry->name))
-      transform.statusText = p.names[*status];
+    if (const auto status = statuses.find(entry->name); status != statuses.end())
+      transform.statusText = p.names[status->second];
     const Matrix& matrix = entry->value;
     if (matrix.fault) {
       if (TransformStatusOf(transform.statusText) == TransformStatus::Valid)
@@ -488,7 +491,7 @@ SequenceFrame SequenceFile::Frame(int index) const
 double SequenceFile::Time(int index) const
 {
   CheckIndex(parts_->content, index);
-  const double* time = parts_->times.Find(index, 0);
+  const double* time = parts_->times.Only(index);
   return time ? *time : std::numeric_limits<double>::quiet_NaN();
 }
 

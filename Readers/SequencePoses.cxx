@@ -7,6 +7,9 @@
 #include "Core/Base/JoinedText.h"
 #include <algorithm>
 #include <cctype>
+#include <map>
+#include <set>
+#include <string_view>
 
 namespace echorama {
 namespace {
@@ -54,10 +57,13 @@ std::string ChooseWorldFrame(const TransformGraph& graph, const std::string& ima
     if (has(reachable, usual))
       return usual;
   std::vector<std::string> ends;
-  const std::vector<NamedTransform> edges = graph.Edges();
+  std::set<std::string> entered, left;
+  for (const NamedTransform& edge : graph.Edges()) {
+    entered.insert(edge.to);
+    left.insert(edge.from);
+  }
   for (const std::string& frame : reachable)
-    if (std::any_of(edges.begin(), edges.end(), [&](const auto& edge) { return edge.to == frame; }) &&
-        std::none_of(edges.begin(), edges.end(), [&](const auto& edge) { return edge.from == frame; }))
+    if (entered.count(frame) > 0 && left.count(frame) == 0)
       ends.push_back(frame);
   if (ends.size() != 1)
     throw Error(Error::Kind::NotPossible,
@@ -126,11 +132,14 @@ std::vector<std::string> SequencePoses::Tools() const
 
 void SequencePoses::MoveTo(const SequenceFrame& frame)
 {
+  std::map<std::string_view, const SequenceTransform*> given;
+  for (const SequenceTransform& transform : frame.transforms)
+    given.emplace(transform.name, &transform);
   for (const std::string& name : names_) {
     NamedTransform edge = EdgeOf(name);
-    if (const SequenceTransform* transform = frame.Find(name)) {
-      edge.matrix = transform->matrix;
-      edge.status = transform->status;
+    if (const auto transform = given.find(name); transform != given.end()) {
+      edge.matrix = transform->second->matrix;
+      edge.status = transform->second->status;
     } else
       edge.status = TransformStatus::Missing;
     graph_.Set(edge);

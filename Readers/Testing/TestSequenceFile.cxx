@@ -4,6 +4,7 @@
 #include "Core/Base/Random.h"
 #include "Readers/Compression.h"
 #include "Readers/SequenceFile.h"
+#include "Readers/Testing/Effort.h"
 #include "Readers/Testing/ObliqueVolume.h"
 #include "Readers/VolumeFile.h"
 #include "Testing/TemporaryFolder.h"
@@ -376,6 +377,43 @@ TEST_F(SequenceFileTest, MatricesThatCannotBeUsedAreMarkedInvalid)
   // A name that is none of a transform stays a field.
   SequenceFile odd(Put("d.mha", Meta({}, "Seq_Frame0000_ProbeTransform = 1 2 3\n")));
   EXPECT_EQ(odd.Frame(0).fields, (std::vector<HeaderField>{{"ProbeTransform", "1 2 3"}}));
+}
+
+TEST_F(SequenceFileTest, EffortGrowsWithTheNumberOfTransformsOfAFrame)
+{
+  const auto put = [this](int transforms) {
+    std::string matrices, statuses;
+    for (int i = 0; i < transforms; ++i) {
+      const std::string key = "Seq_Frame0000_A" + std::to_string(i) + "ToBTransform";
+      matrices += key + " = " + Still + "\n";
+      statuses += key + "Status = " + (i % 4 == 1 ? "MISSING" : "OK") + "\n";
+    }
+    return Put(std::to_string(transforms) + ".mha",
+               Meta({{"DimSize", "0 0 1"}, {"ElementType", "MET_OTHER"}}, matrices + statuses, ""));
+  };
+  const std::string few = put(1000), many = put(32000);
+  const auto open = [](const std::string& path) { return ProcessorSeconds([&] { SequenceFile file(path); }); };
+  EXPECT_LT(open(many), 128 * open(few)); // 32 times as many must not cost 1024 times the effort
+  const SequenceFile fewFile(few), manyFile(many);
+  const auto frame = [](const SequenceFile& file) { return ProcessorSeconds([&] { file.Frame(0); }); };
+  EXPECT_LT(frame(manyFile), 128 * frame(fewFile));
+  const SequenceFrame there = manyFile.Frame(0);
+  ASSERT_EQ(there.transforms.size(), 32000u);
+  for (std::size_t i = 0; i < 32000; ++i)
+    ASSERT_EQ(there.transforms[i].status, i % 4 == 1 ? TransformStatus::Missing : TransformStatus::Valid) << i;
+}
+
+TEST_F(SequenceFileTest, NotesCountTheFramesThatATransformIsValidIn)
+{
+  // Said before and after the matrix, in frames in any order; a status without a matrix, and one that comes again.
+  const std::string a = "_AToBTransform = " + Still + "\n", b = "_CToBTransform = " + Still + "\n",
+                    bad = "TransformStatus = INVALID\n", good = "TransformStatus = OK\n";
+  const SequenceFile file(
+      Put("a.mha", Meta({}, "Seq_Frame0002" + a + "Seq_Frame0000_AToB" + bad + "Seq_Frame0000" + a + "Seq_Frame0000" + b +
+                                "Seq_Frame0001" + b + "Seq_Frame0001_AToB" + bad + "Seq_Frame0001_CToB" + good + "Seq_Frame0002" +
+                                b + "Seq_Frame0002_AToB" + good + "Seq_Frame0002_CToB" + bad + "Seq_Frame0002_CToB" + bad)));
+  EXPECT_TRUE(HasNote(file.Content(), "AToBTransform is valid in 1 of 3 frames"));
+  EXPECT_TRUE(HasNote(file.Content(), "CToBTransform is valid in 2 of 3 frames"));
 }
 
 TEST_F(SequenceFileTest, NamesOfSequences)

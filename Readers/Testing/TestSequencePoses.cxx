@@ -2,6 +2,7 @@
 // Which frame is the world, and poses in it against products of matrices written out.
 #include "Core/Base/Random.h"
 #include "Readers/SequencePoses.h"
+#include "Readers/Testing/Effort.h"
 #include "Testing/TemporaryFolder.h"
 
 using namespace echorama;
@@ -148,4 +149,30 @@ TEST(SequencePosesTest, FramesOfSeveralSlicesAreNeitherMirroredNorSheared)
   wrong = pose;
   wrong.linear().col(2) += 0.1 * wrong.linear().col(0);
   refused(wrong);
+}
+
+TEST(SequencePosesTest, EffortGrowsWithTheNumberOfTransforms)
+{
+  const auto names = [](int count) {
+    std::vector<std::string> list;
+    for (int i = 0; i < count; ++i)
+      list.push_back("A" + std::to_string(i) + "ToB");
+    return list;
+  };
+  const auto choosing = [&](int count) {
+    const TransformGraph graph = Graph(names(count));
+    return ProcessorSeconds([&] { EXPECT_EQ(ChooseWorldFrame(graph, "Image", ""), "B"); });
+  };
+  const auto moving = [&](int count) {
+    SequenceContent content;
+    content.transforms = names(count);
+    SequenceFrame frame;
+    for (const std::string& name : content.transforms)
+      frame.transforms.push_back({name});
+    SequencePoses poses(content, {});
+    return ProcessorSeconds([&] { poses.MoveTo(frame); });
+  };
+  // 32 times as many must not cost 1024 times the effort.
+  EXPECT_LT(choosing(32000), 128 * choosing(1000));
+  EXPECT_LT(moving(32000), 128 * moving(1000));
 }
