@@ -40,10 +40,10 @@ bool BeginsLikeDicom(const std::string& path)
 std::vector<std::string> FilesOf(const std::string& folder)
 {
   std::vector<std::string> files;
-  std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error))
-    if (entry.is_regular_file(error))
-      files.push_back(entry.path().string());
+  std::error_code error, ofEntry; // such as that of a link to nowhere, which is no fault of the folder
+  for (fs::directory_iterator entry(folder, error), end; entry != end; entry.increment(error))
+    if (entry->is_regular_file(ofEntry))
+      files.push_back(entry->path().string());
   if (error)
     throw Error(Error::Kind::FileSystem, folder + ": " + error.message());
   std::sort(files.begin(), files.end());

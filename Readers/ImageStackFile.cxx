@@ -133,19 +133,19 @@ private:
 void ImageStack::Collect()
 {
   const std::string& path = content_.path;
-  std::error_code error;
-  std::vector<fs::path> others;
+  std::error_code error, ofEntry; // such as that of a link to nowhere, which is no fault of the folder
+  const fs::directory_iterator end;
   if (!fs::exists(path, error))
     throw Error(Error::Kind::FileSystem, path + ": there is no such file");
   if (fs::is_directory(path, error)) {
     std::string ignored;
     int ignoredCount = 0;
-    for (const auto& entry : fs::directory_iterator(path, error)) {
-      const std::string name = entry.path().filename().string();
-      if (name[0] == '.' || entry.is_directory(error))
+    for (fs::directory_iterator entry(path, error); entry != end; entry.increment(error)) {
+      const std::string name = entry->path().filename().string();
+      if (name[0] == '.' || entry->is_directory(ofEntry))
         continue;
-      if (const PictureKind kind = KindOfFile(entry.path()); kind != PictureKind::None)
-        slices_.push_back({entry.path().string(), kind});
+      if (const PictureKind kind = KindOfFile(entry->path()); kind != PictureKind::None)
+        slices_.push_back({entry->path().string(), kind});
       else if (++ignoredCount == 1 || name < ignored)
         ignored = name;
     }
@@ -164,11 +164,12 @@ void ImageStack::Collect()
     const auto [pattern, number] = SplitNumber(fs::path(path).filename().string());
     const bool alone = number < 0 || (kind == PictureKind::Tiff && ReadTiffPages(path).pages.size() > 1);
     fs::path folder = fs::path(path).parent_path();
-    for (const auto& entry : alone ? fs::directory_iterator() : fs::directory_iterator(folder.empty() ? "." : folder, error)) {
-      const auto [otherPattern, otherNumber] = SplitNumber(entry.path().filename().string());
-      if (otherPattern == pattern && otherNumber >= 0 && entry.path().filename() != fs::path(path).filename())
-        if (const PictureKind otherKind = KindOfFile(entry.path()); otherKind != PictureKind::None)
-          slices_.push_back({(folder / entry.path().filename()).string(), otherKind});
+    for (auto entry = alone ? end : fs::directory_iterator(folder.empty() ? "." : folder, error); entry != end;
+         entry.increment(error)) {
+      const auto [otherPattern, otherNumber] = SplitNumber(entry->path().filename().string());
+      if (otherPattern == pattern && otherNumber >= 0 && entry->path().filename() != fs::path(path).filename())
+        if (const PictureKind otherKind = KindOfFile(entry->path()); otherKind != PictureKind::None)
+          slices_.push_back({(folder / entry->path().filename()).string(), otherKind});
     }
   }
   std::sort(slices_.begin(), slices_.end(), [](const Picture& a, const Picture& b) {
@@ -366,8 +367,8 @@ bool LooksLikeImage(std::string_view start)
 bool HoldsImages(const std::string& folder)
 {
   std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder, error))
-    if (entry.path().filename().string()[0] != '.' && KindOfFile(entry.path()) != PictureKind::None)
+  for (fs::directory_iterator entry(folder, error), end; entry != end; entry.increment(error))
+    if (entry->path().filename().string()[0] != '.' && KindOfFile(entry->path()) != PictureKind::None)
       return true;
   return false;
 }

@@ -246,6 +246,21 @@ TEST_F(DicomFile, DeflatedDataAreChecked)
   ExpectRefused([&] { OpenVolume(path); }, Error::Kind::BadFile, path, "deflated");
 }
 
+// Of a folder, whatever the order is in which it gives them: editors leave such links beside what they have open.
+TEST_F(DicomFile, LinksToNowhere)
+{
+  PutSlices(3);
+  for (int i = 0; i < 60; ++i)
+    std::filesystem::create_symlink("user@host.123:456", Path(".#" + std::to_string(i)));
+  std::filesystem::create_symlink("round", Path("round"));
+  for (const std::string& path : {folder.string(), Path("s1")}) {
+    EXPECT_EQ(FormatOfContent(path), FileFormat::Dicom);
+    const auto source = OpenVolume(path);
+    EXPECT_EQ(source->Content().geometry.dimensions[2], 3);
+    EXPECT_TRUE(source->Content().notes.empty());
+  }
+}
+
 TEST_F(DicomFile, APipeIsNotWaitedFor)
 {
   const std::string path = Path("pipe.dcm");

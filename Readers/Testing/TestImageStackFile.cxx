@@ -216,6 +216,21 @@ TEST_F(ImageStackFile, OneFileStandsForTheStackBesideIt)
   EXPECT_EQ(OpenImageStack(Path("b_09.png"))->Content().geometry.dimensions[2], 1);
 }
 
+// Whatever the order is in which the folder gives them.
+TEST_F(ImageStackFile, LinksToNowhere)
+{
+  for (int k = 1; k <= 3; ++k)
+    Png<unsigned char>("img" + std::to_string(k) + ".png", Pattern<unsigned char>(5, 4), 5, 4);
+  for (int i = 0; i < 60; ++i)
+    std::filesystem::create_symlink("user@host.123:456", Path(".#" + std::to_string(i)));
+  for (int k = 4; k < 40; ++k)
+    std::filesystem::create_symlink("gone.png", Path("img" + std::to_string(k) + ".png"));
+  const auto whole = OpenImageStack(folder.string());
+  EXPECT_EQ(whole->Content().geometry.dimensions[2], 3);
+  EXPECT_TRUE(HasNote(whole->Content(), "36 files of the folder")) << "a slice that is gone is told";
+  EXPECT_EQ(OpenImageStack(Path("img2.png"))->Content().geometry.dimensions[2], 3);
+}
+
 TEST_F(ImageStackFile, EveryTypeOfImage)
 {
   const auto eight = Pattern<unsigned char>(20, 18);
