@@ -357,8 +357,8 @@ private:
       if (!(steps[i] > tolerance))
         Fail("two pictures lie at the same place (" + WhereIs(slices[i]) + " and " + WhereIs(slices[i + 1]) + ")");
       if (std::abs(steps[i] - median) > tolerance)
-        Fail("its slices are unevenly spaced: " + Mm(steps[i]) + " " + between + ", " + NumberText(median) +
-             " mm elsewhere; are slices missing?");
+        Fail("its slices are unevenly spaced: " + Mm(steps[i]) + " " + between + ", " + Mm(median) +
+             " elsewhere; are slices missing?");
       const Eigen::Vector3d there = geometry.origin + normal * (slices[i + 1].along - slices[0].along);
       const double aside = (*(PictureOf(slices[i + 1]).*plane).position - there).norm();
       if (aside > std::max(evenness, 1e-2 * one.spacing.minCoeff()))

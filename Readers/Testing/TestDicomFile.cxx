@@ -58,15 +58,16 @@ constexpr std::uint32_t Undefined = 0xFFFFFFFF;
 const std::string EndOfItem = Tag(0xFFFE, 0xE00D) + Number(0, 4), EndOfSequence = Tag(0xFFFE, 0xE0DD) + Number(0, 4);
 
 // A slice of 8 x 6 pixels that count up from k.
-std::string Slice(int k, int bits = 8)
+std::string Slice(int k, int bits = 8, const std::string& along = "")
 {
   std::string pixels;
   for (int i = 0; i < 48; ++i)
     pixels += Number(static_cast<std::uint64_t>(i * 5 + k), bits / 8);
   return Element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.6.1") + Element(8, 0x18, "UI", "1.2.3." + std::to_string(k)) +
          Element(8, 0x60, "CS", "US") + Element(0x20, 0xE, "UI", "1.2.3") +
-         Element(0x20, 0x32, "DS", "1.5\\-2.5\\" + std::to_string(3 + 2 * k)) + Element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") +
-         Element(0x28, 2, "US", Number(1, 2)) + Element(0x28, 4, "CS", "MONOCHROME2") + Element(0x28, 0x10, "US", Number(6, 2)) +
+         Element(0x20, 0x32, "DS", "1.5\\-2.5\\" + (along.empty() ? std::to_string(3 + 2 * k) : along)) +
+         Element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") + Element(0x28, 2, "US", Number(1, 2)) +
+         Element(0x28, 4, "CS", "MONOCHROME2") + Element(0x28, 0x10, "US", Number(6, 2)) +
          Element(0x28, 0x11, "US", Number(8, 2)) + Element(0x28, 0x30, "DS", "0.5\\0.25") +
          Element(0x28, 0x100, "US", Number(static_cast<unsigned>(bits), 2)) +
          Element(0x28, 0x101, "US", Number(static_cast<unsigned>(bits), 2)) +
@@ -244,6 +245,15 @@ TEST_F(DicomFile, DeflatedDataAreChecked)
 {
   const std::string path = Put("deflated", StartOf("1.2.840.10008.1.2.1.99") + "not deflated");
   ExpectRefused([&] { OpenVolume(path); }, Error::Kind::BadFile, path, "deflated");
+}
+
+TEST_F(DicomFile, AGapIsToldInShort)
+{
+  const char* const places[] = {"0.1", "1.4", "2.7", "4.0", "6.6"}; // whose differences are not quite 1.3
+  for (int k = 0; k < 5; ++k)
+    Put("s" + std::to_string(k), Start + Slice(k, 8, places[k]));
+  ExpectRefused([&] { OpenVolume(folder.string()); }, Error::Kind::BadFile, folder.string(),
+                "2.6 mm between s3 and s4, 1.3 mm elsewhere");
 }
 
 // Of a folder, whatever the order is in which it gives them: editors leave such links beside what they have open.
