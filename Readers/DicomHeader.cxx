@@ -219,9 +219,10 @@ private:
       FailFile(path_,
                "it holds " + std::to_string(count) + " frames and functional groups for " + std::to_string(groups->size()));
     header_.grouped = true;
-    const std::vector<DicomData>* shared = data.Sequence(DicomSharedGroups);
+    const DicomData none, *shared = &none; // not copied: it may be large
+    WithItem(data, DicomSharedGroups, [&shared](const DicomData& item) { shared = &item; });
     for (const DicomData& own : *groups)
-      header_.pictures.push_back(GroupedPicture(shared && !shared->empty() ? shared->front() : DicomData(), own));
+      header_.pictures.push_back(GroupedPicture(*shared, own));
   }
 
   void ReadPhilips(const DicomData& data)

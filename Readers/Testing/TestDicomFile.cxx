@@ -5,6 +5,7 @@
 #include "Readers/DicomFile.h"
 #include "Readers/DicomHeader.h"
 #include "Testing/TemporaryFolder.h"
+#include <ctime>
 #include <gdcmImageChangeTransferSyntax.h>
 #include <gdcmImageReader.h>
 #include <gdcmImageWriter.h>
@@ -245,6 +246,30 @@ TEST_F(DicomFile, DeflatedDataAreChecked)
 {
   const std::string path = Put("deflated", StartOf("1.2.840.10008.1.2.1.99") + "not deflated");
   ExpectRefused([&] { OpenVolume(path); }, Error::Kind::BadFile, path, "deflated");
+}
+
+// The time is that of the frames and that of what they share, not their product.
+TEST_F(DicomFile, WhatFramesShareIsReadOnce)
+{
+  const auto seconds = [this](std::size_t frames, std::size_t shared) {
+    std::string own, inner, pixels(frames, 'p');
+    for (std::size_t i = 0; i < frames; ++i)
+      own += Item("", 0);
+    for (std::size_t i = 0; i < shared; ++i)
+      inner += Item("", 0);
+    inner = Element(0x20, 0x9113, "SQ", inner);
+    const std::string path =
+        Put("shared", Start + Element(0x28, 4, "CS", "MONOCHROME2") + Element(0x28, 8, "IS", std::to_string(frames)) +
+                          Element(0x28, 0x10, "US", Number(1, 2)) + Element(0x28, 0x11, "US", Number(1, 2)) +
+                          Element(0x28, 0x100, "US", Number(8, 2)) +
+                          Element(0x5200, 0x9229, "SQ", Item(inner, static_cast<std::uint32_t>(inner.size()))) +
+                          Element(0x5200, 0x9230, "SQ", own) + Element(0x7FE0, 0x10, "OB", pixels));
+    const std::clock_t begin = std::clock(); // of this process alone
+    EXPECT_EQ(ReadDicomHeader(path).pictures.size(), frames);
+    return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+  };
+  const double apart = seconds(2000, 1) + seconds(1, 20000);
+  EXPECT_LT(seconds(2000, 20000), 8.0 * apart);
 }
 
 TEST_F(DicomFile, AGapIsToldInShort)
