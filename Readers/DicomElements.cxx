@@ -8,7 +8,6 @@
 #include "Core/Base/NumberText.h"
 #include "Readers/DataFile.h"
 #include <algorithm>
-#include <limits>
 #include <sstream>
 #include <zlib.h>
 
@@ -19,6 +18,8 @@ constexpr std::uint32_t Undefined = 0xFFFFFFFF;
 constexpr DicomTag ItemTag = 0xFFFEE000, ItemEnd = 0xFFFEE00D, SequenceEnd = 0xFFFEE0DD, PixelTag = 0x7FE00010;
 constexpr int deepest = 16; // sequences in sequences
 constexpr std::uint64_t longestValue = 65536;
+constexpr std::uint64_t mostInflated = 1032; // bytes of one that is deflated
+constexpr const char* damagedDeflation = "its deflated data are damaged or end early";
 
 constexpr const char* ImplicitLittleEndian = "1.2.840.10008.1.2";
 constexpr const char* Deflated = "1.2.840.10008.1.2.1.99";
@@ -89,6 +90,7 @@ public:
 
   DicomPlace pixels, kretz;
   bool encapsulated = false;
+  bool inflating = false; // then the end is where the data end at the latest, and what follows the pixels is not looked at
 
 private:
   void Seek(std::uint64_t at)
@@ -142,8 +144,8 @@ private:
     if (depth > deepest)
       FailFile(path_, "its sequences are nested more than " + std::to_string(deepest) + " deep");
     while (at_ < end) {
-      if (depth == 0 && pixels.bytes > 0 && end - at_ < 8)
-        return; // padding
+      if (depth == 0 && (pixels.bytes > 0 ? inflating || end - at_ < 8 : inflating && stream_.peek() == EOF))
+        return; // what follows is padding, if anything
       if (Element(data, explicitTypes, end, depth, nullptr))
         return;
     }
@@ -240,34 +242,63 @@ private:
   const std::string& path_;
 };
 
-// A deflated data set (without zlib's head), at most as long as such a stream can be.
-std::string Inflated(std::istream& stream, std::uint64_t at, std::uint64_t bytes, const std::string& path)
-{
-  std::string packed(bytes, '\0'), out;
-  stream.clear();
-  stream.seekg(static_cast<std::streamoff>(at));
-  if (!stream.read(packed.data(), static_cast<std::streamsize>(bytes)))
-    FailFile(path, "it cannot be read");
-  z_stream z{};
-  inflateInit2(&z, -MAX_WBITS);
-  z.next_in = reinterpret_cast<Bytef*>(packed.data());
-  z.avail_in = static_cast<uInt>(std::min<std::uint64_t>(bytes, std::numeric_limits<uInt>::max()));
-  int status = Z_OK;
-  while (status == Z_OK) {
-    const std::size_t done = out.size();
-    out.resize(done + (std::size_t{1} << 20));
-    z.next_out = reinterpret_cast<Bytef*>(out.data() + done);
-    z.avail_out = 1u << 20;
-    status = inflate(&z, Z_NO_FLUSH);
-    out.resize(out.size() - z.avail_out);
-    if (status == Z_OK && z.avail_in == 0 && z.avail_out > 0)
-      break;
+// The deflated data set (without zlib's head) from where \a packed stands, to be read forwards. A small file may inflate to a
+// thousand times as much, so nothing is kept, and what is skipped at the end, such as pixels, is not even inflated.
+class InflatingBuffer : public std::streambuf {
+public:
+  explicit InflatingBuffer(std::istream& packed) : packed_(packed) { inflateInit2(&z_, -MAX_WBITS); }
+  ~InflatingBuffer() override { inflateEnd(&z_); }
+
+  // Or it has come to its end before what was last sought.
+  bool IsDamaged() const { return status_ != Z_OK && (status_ != Z_STREAM_END || skipped_ > 0); }
+
+protected:
+  int_type underflow() override
+  {
+    const std::uint64_t wanted = At();
+    while (End() <= wanted && status_ == Z_OK) {
+      begin_ = End();
+      z_.next_out = reinterpret_cast<Bytef*>(plain_);
+      z_.avail_out = sizeof plain_;
+      while (z_.avail_out > 0 && status_ == Z_OK) {
+        if (z_.avail_in == 0) {
+          packed_.read(read_, sizeof read_);
+          z_.next_in = reinterpret_cast<Bytef*>(read_);
+          z_.avail_in = static_cast<uInt>(packed_.gcount());
+        }
+        status_ = inflate(&z_, Z_NO_FLUSH); // without input: Z_BUF_ERROR
+      }
+      count_ = sizeof plain_ - z_.avail_out;
+    }
+    Place(wanted);
+    return gptr() < egptr() ? traits_type::to_int_type(*gptr()) : traits_type::eof();
   }
-  inflateEnd(&z);
-  if (status != Z_STREAM_END)
-    FailFile(path, "its deflated data are damaged or end early");
-  return out;
-}
+
+  pos_type seekpos(pos_type position, std::ios_base::openmode) override
+  {
+    const auto wanted = static_cast<std::uint64_t>(std::streamoff(position));
+    if (wanted < begin_)
+      return pos_type(off_type(-1));
+    Place(wanted);
+    return position;
+  }
+
+private:
+  void Place(std::uint64_t at) // not before begin_
+  {
+    skipped_ = at > End() ? at - End() : 0;
+    setg(plain_, plain_ + (at - skipped_ - begin_), plain_ + count_);
+  }
+
+  std::uint64_t At() const { return begin_ + static_cast<std::uint64_t>(gptr() - eback()) + skipped_; }
+  std::uint64_t End() const { return begin_ + count_; }
+
+  std::istream& packed_;
+  z_stream z_{};
+  int status_ = Z_OK;
+  std::uint64_t begin_ = 0, count_ = 0, skipped_ = 0; // of what is in plain_; what a seek has yet to leave out
+  char read_[1 << 14], plain_[1 << 16];
+};
 
 } // namespace
 
@@ -340,22 +371,27 @@ DicomElements ReadDicomElements(std::istream& stream, std::uint64_t bytes, const
   };
   elements.deflated = elements.transferSyntax == Deflated;
   if (elements.deflated) {
-    const std::string plain = Inflated(stream, parser.At(), bytes - parser.At(), path);
-    std::istringstream inflated(plain);
-    Parser inside(inflated, plain.size(), path);
+    InflatingBuffer buffer(stream);
+    std::istream inflated(&buffer);
+    Parser inside(inflated, mostInflated * (bytes - parser.At()), path);
+    inside.inflating = true;
     take(inside, true);
+    if (buffer.IsDamaged())
+      FailFile(path, damagedDeflation);
   } else
     take(parser, elements.transferSyntax != ImplicitLittleEndian);
   return elements;
 }
 
-std::string InflatedDicomData(const std::string& path)
+void ReadInflatedDicom(const std::string& path, std::uint64_t offset, char* out, std::uint64_t bytes)
 {
   std::ifstream stream = OpenToRead(path);
-  const std::uint64_t bytes = FileSize(path);
-  Parser parser(stream, bytes, path);
-  parser.MetaInformation();
-  return Inflated(stream, parser.At(), bytes - parser.At(), path);
+  Parser(stream, FileSize(path), path).MetaInformation();
+  InflatingBuffer buffer(stream);
+  std::istream inflated(&buffer);
+  inflated.seekg(static_cast<std::streamoff>(offset));
+  if (!inflated.read(out, static_cast<std::streamsize>(bytes)))
+    FailFile(path, damagedDeflation);
 }
 
 } // namespace echorama

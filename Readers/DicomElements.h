@@ -54,12 +54,13 @@ constexpr std::uint64_t DicomPreamble = 132;
 // The sequences with the attributes of all pictures of an enhanced object, and of each; calibrated regions.
 constexpr DicomTag DicomSharedGroups = 0x52009229, DicomPictureGroups = 0x52009230, DicomRegions = 0x00186011;
 
-/// Parses a file of \a bytes bytes that begins like DICOM. Every length is compared with the bytes that are there before anything
-/// is allocated for it. \throws Error(BadFile) that names the file and what is wrong.
+/// Parses a file of \a bytes bytes that begins like DICOM. Every length is compared with the bytes that are there (in a deflated
+/// file: that can be there) before anything is allocated for it. A deflated file is read up to its pixels.
+/// \throws Error(BadFile) that names the file and what is wrong.
 DicomElements ReadDicomElements(std::istream& stream, std::uint64_t bytes, const std::string& path);
 
-/// The inflated data set of a deflated file.
-std::string InflatedDicomData(const std::string& path);
+/// Reads \a bytes bytes from \a offset on of the data set of a deflated file. \throws Error(BadFile) when they are not there.
+void ReadInflatedDicom(const std::string& path, std::uint64_t offset, char* out, std::uint64_t bytes);
 
 template <class T>
 std::vector<T> DicomData::Binary(DicomTag tag, std::size_t count) const

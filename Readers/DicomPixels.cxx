@@ -118,11 +118,9 @@ std::vector<char> DecodeDicomPixels(const DicomHeader& header, const Progress& p
 {
   const std::uint64_t wanted = header.PictureBytes() * header.pictures.size();
   if (header.storage == DicomStorage::Deflated) {
-    const std::string plain = InflatedDicomData(header.path);
-    if (plain.size() < header.pixelOffset || plain.size() - header.pixelOffset < wanted)
-      FailPixels(header);
-    const auto first = plain.begin() + static_cast<std::ptrdiff_t>(header.pixelOffset);
-    return {first, first + static_cast<std::ptrdiff_t>(wanted)};
+    std::vector<char> pixels(wanted);
+    ReadInflatedDicom(header.path, header.pixelOffset, pixels.data(), wanted);
+    return pixels;
   }
 
   const std::vector<std::string> fragments = ReadDicomFragments(header);

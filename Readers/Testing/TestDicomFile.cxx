@@ -2,6 +2,7 @@
 // Elements byte by byte, for what no library writes: lengths that lie, sequences without an end. Objects of all kinds are
 // read in TestDicom.py.
 #include "Core/Base/Random.h"
+#include "Core/Sharing/IsolatedTask.h"
 #include "Readers/DicomFile.h"
 #include "Readers/DicomHeader.h"
 #include "Testing/TemporaryFolder.h"
@@ -10,6 +11,7 @@
 #include <gdcmImageReader.h>
 #include <gdcmImageWriter.h>
 #include <sys/stat.h>
+#include <zlib.h>
 
 using namespace echorama;
 using namespace echorama::testing;
@@ -74,6 +76,21 @@ std::string Slice(int k, int bits = 8, const std::string& along = "")
          Element(0x28, 0x101, "US", Number(static_cast<unsigned>(bits), 2)) +
          Element(0x28, 0x102, "US", Number(static_cast<unsigned>(bits - 1), 2)) + Element(0x28, 0x103, "US", Number(0, 2)) +
          Element(0x7FE0, 0x10, bits == 8 ? "OB" : "OW", pixels);
+}
+
+std::string Deflated(const std::string& elements)
+{
+  z_stream z{};
+  deflateInit2(&z, 9, Z_DEFLATED, -MAX_WBITS, 9, Z_DEFAULT_STRATEGY);
+  std::string packed(deflateBound(&z, elements.size()), '\0');
+  z.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(elements.data()));
+  z.avail_in = static_cast<uInt>(elements.size());
+  z.next_out = reinterpret_cast<Bytef*>(packed.data());
+  z.avail_out = static_cast<uInt>(packed.size());
+  EXPECT_EQ(deflate(&z, Z_FINISH), Z_STREAM_END);
+  packed.resize(z.total_out);
+  deflateEnd(&z);
+  return StartOf("1.2.840.10008.1.2.1.99") + packed;
 }
 
 class DicomFile : public TemporaryFolder {
@@ -240,6 +257,50 @@ TEST_F(DicomFile, DamagedStructure)
     nested += Tag(0x20, 0x9301) + "SQ" + Number(0, 2) + Number(Undefined, 4) + Tag(0xFFFE, 0xE000) + Number(Undefined, 4);
   ExpectBad(nested, "nested");
   ExpectBad("", "");
+}
+
+// To open it, no more than its head; to read it, up to the end of its pixels.
+TEST_F(DicomFile, DeflatedFilesAreInflatedPieceByPiece)
+{
+  Random random(3);
+  std::string noise;
+  for (int i = 0; i < 100000; ++i)
+    noise += Number(random.Bits(), 2);
+  const std::string path =
+      Put("deflated", Deflated(Element(9, 0x1010, "UN", noise) + Slice(2) + Element(0x7FE1, 0x10, "LO", "A")));
+  std::vector<unsigned char> voxels(48);
+  OpenVolume(path)->Read(0, voxels.data(), nullptr);
+  for (int i = 0; i < 48; ++i)
+    EXPECT_EQ(voxels[static_cast<std::size_t>(i)], 2 + i * 5);
+
+  const std::size_t bytes = std::filesystem::file_size(path);
+  std::filesystem::resize_file(path, bytes / 2);
+  ExpectRefused([&] { OpenVolume(path); }, Error::Kind::BadFile, path, "");
+  Put("deflated", Deflated(Slice(2) + Element(9, 0x1010, "UN", "12", 20000)));
+  EXPECT_EQ(ReadDicomHeader(path).pictures.size(), 1u) << "what follows the pixels is not looked at";
+  Put("deflated", Deflated(Element(8, 0x60, "CS", "US") + Element(9, 0x1010, "UN", "12", 20000)));
+  ExpectRefused([&] { OpenVolume(path); }, Error::Kind::BadFile, path, "end early");
+  Put("deflated", Deflated(Element(9, 0x1010, "UN", "12", 0xFFFFFFF0u)));
+  ExpectRefused([&] { OpenVolume(path); }, Error::Kind::BadFile, path, "(0009,1010)");
+
+  // Pixels of noise, so that a part of the file is a part of them.
+  std::string large = Slice(0);
+  const std::string rows = Element(0x28, 0x10, "US", Number(6, 2)), pixels = large.substr(large.size() - 48 - 12);
+  large.replace(large.find(rows), rows.size(), Element(0x28, 0x10, "US", Number(25000, 2)));
+  large.replace(large.find(pixels), pixels.size(), Element(0x7FE0, 0x10, "OB", noise));
+  Put("deflated", Deflated(large));
+  std::filesystem::resize_file(path, 150000);
+  EXPECT_EQ(ReadDicomHeader(path).rows, 25000) << "its pixels are not looked at yet";
+  const auto source = OpenVolume(path);
+  voxels.resize(200000);
+  ExpectRefused([&] { source->Read(0, voxels.data(), nullptr); }, Error::Kind::BadFile, path, "end early");
+}
+
+TEST_F(DicomFile, DeflatedFilesTakeLittleMemory)
+{
+  constexpr std::size_t bomb = 128 << 20;
+  const std::string path = Put("deflated", Deflated(Element(9, 0x1010, "UN", std::string(bomb, '\0')) + Slice(2)));
+  EXPECT_EQ(RunIsolated([&] { return ReadDicomHeader(path).columns == 8; }, {60.0, bomb / 4}), TaskOutcome::Succeeded);
 }
 
 TEST_F(DicomFile, DeflatedDataAreChecked)
