@@ -17,6 +17,7 @@
 #include <fstream>
 #include <functional>
 #include <map>
+#include <utility>
 
 namespace fs = std::filesystem;
 
@@ -76,6 +77,7 @@ public:
 
   void Place()
   {
+    TakeColoursOfStreams();
     CheckAlike();
     const DicomHeader& first = files_[0];
     if (files_.size() == 1 && first.volumeSlices > 0)
@@ -208,6 +210,18 @@ private:
   {
     return "it holds a movie in GE's private format (GEMS_Ultrasound_MovieGroup_001), which is not publicly known; export it as "
            "a Cartesian or Kretz volume";
+  }
+
+  void TakeColoursOfStreams()
+  {
+    std::string note;
+    for (DicomHeader& file : files_)
+      if (file.storage == DicomStorage::Encapsulated && file.samples == 3)
+        if (const auto header = std::exchange(file.photometric, ColoursOfDicomStream(file)); header != file.photometric)
+          note = "Its header says that its colours are " + header + ", and its JPEG that they are " + file.photometric +
+                 ", which is taken.";
+    if (!note.empty())
+      Note(note);
   }
 
   void CheckAlike() const

@@ -6,19 +6,124 @@
 #include "Core/Base/Error.h"
 #include "Core/Sharing/IsolatedTask.h"
 #include "Readers/DicomElements.h"
+#include <algorithm>
 #include <fstream>
 #include <gdcmImage.h>
 #include <gdcmSequenceOfFragments.h>
 #include <gdcmTrace.h>
+#include <limits>
 #include <new>
+#include <string_view>
 #include <sys/mman.h>
 
 namespace echorama {
 namespace {
 
-[[noreturn]] void FailPixels(const DicomHeader& header)
+constexpr std::size_t longestHead = 1 << 20; // of a JPEG, with the profiles of colour that it may hold
+constexpr const char* ofUnknownKind = "they are damaged or of a kind that is not supported";
+
+[[noreturn]] void FailPixels(const DicomHeader& header, const std::string& reason)
 {
-  FailFile(header.path, "its pixels cannot be decoded: they are damaged or of a kind that is not supported");
+  FailFile(header.path, "its pixels cannot be decoded: " + reason);
+}
+
+// Four bytes, the lowest first.
+std::uint32_t Number(const std::string& bytes, std::size_t at)
+{
+  std::uint32_t number = 0;
+  for (std::size_t i = 4; i > 0; --i)
+    number = number << 8 | (at + i <= bytes.size() ? static_cast<unsigned char>(bytes[at + i - 1]) : 0u);
+  return number;
+}
+
+// The items of compressed pixels, one after the other: a table of the offsets of the pictures, which may be empty, and fragments.
+class Items {
+public:
+  explicit Items(const DicomHeader& header)
+    : header_(header), stream_(header.path, std::ios::binary), at_(header.pixelOffset), end_(at_ + header.pixelBytes)
+  {
+    stream_.seekg(static_cast<std::streamoff>(at_));
+  }
+
+  // The bytes of the next one, no more than \a most (then it is the last to be asked for). \returns false at the end
+  bool Next(std::string& bytes, std::size_t most = std::numeric_limits<std::size_t>::max())
+  {
+    if (at_ >= end_)
+      return false;
+    std::string head(8, '\0');
+    if (end_ - at_ < 8 || !stream_.read(head.data(), 8))
+      FailPixels(header_, ofUnknownKind);
+    at_ += 8;
+    if (head[2] == '\xDD') // the end of the sequence
+      return false;
+    const std::uint32_t length = Number(head, 4);
+    if (length > end_ - at_)
+      FailPixels(header_, ofUnknownKind);
+    bytes.resize(std::min<std::size_t>(length, most));
+    if (!stream_.read(bytes.data(), static_cast<std::streamsize>(bytes.size())))
+      FailPixels(header_, ofUnknownKind);
+    at_ += length;
+    return true;
+  }
+
+  std::uint64_t At() const { return at_; }
+
+private:
+  const DicomHeader& header_;
+  std::ifstream stream_;
+  std::uint64_t at_, end_;
+};
+
+// What a stream of JPEG, JPEG-LS or JPEG 2000 says of its pixels. gdcm looks at the header alone and gives what is stored.
+struct StreamHead {
+  int numbers = 0, bits = 0; // per pixel, and of one of them; 0: not said
+  bool lossless = false;     // JPEG's lossless process, which gdcm widens to the bits that are allocated
+  std::string colours;       // RGB or YBR_FULL; empty: not said
+};
+
+StreamHead HeadOf(std::string_view s)
+{
+  StreamHead head;
+  const auto byte = [s](std::size_t at) { return at < s.size() ? int{static_cast<unsigned char>(s[at])} : 0; };
+  if (byte(0) == 0xFF && byte(1) == 0x4F) // JPEG 2000
+    return {256 * byte(40) + byte(41), (byte(42) & 0x7F) + 1, false, ""};
+  int transform = -1;
+  bool isJfif = false;
+  for (std::size_t at = 2; at + 4 <= s.size() && byte(at) == 0xFF;) {
+    const int mark = byte(at + 1);
+    isJfif = isJfif || (mark == 0xE0 && s.compare(at + 4, 4, "JFIF") == 0);
+    if (mark == 0xEE && s.compare(at + 4, 5, "Adobe") == 0)
+      transform = byte(at + 15);
+    if (mark == 0xF7 || ((mark & 0xF0) == 0xC0 && mark != 0xC4 && mark != 0xC8 && mark != 0xCC)) { // the head of a frame
+      head.numbers = byte(at + 9);
+      head.bits = byte(at + 4);
+      head.lossless = mark != 0xF7 && (mark & 3) == 3;
+      const bool isYbr = isJfif || transform == 1 || byte(at + 11) != byte(at + 14); // RGB are sampled alike
+      if (mark != 0xF7 && !head.lossless && head.numbers == 3)
+        head.colours = isYbr ? "YBR_FULL" : transform == 0 ? "RGB" : "";
+      break;
+    }
+    at += mark == 0xFF ? 1 : 2 + static_cast<std::size_t>(256 * byte(at + 2) + byte(at + 3)); // bytes may come before a mark
+  }
+  return head;
+}
+
+bool IsYbr(const std::string& photometric)
+{
+  return photometric.compare(0, 8, "YBR_FULL") == 0;
+}
+
+void CheckHead(const DicomHeader& header, const StreamHead& head, std::size_t picture)
+{
+  const int room = head.bits > 16 ? 32 : head.bits > 8 ? 16 : 8;
+  const bool fits = head.lossless ? room <= header.bitsAllocated : room == header.bitsAllocated;
+  if (head.numbers > 0 && (head.numbers != header.samples || !fits))
+    FailPixels(header, "those of frame " + std::to_string(picture + 1) + " are compressed as " + std::to_string(head.numbers) +
+                           " numbers of " + std::to_string(head.bits) + " bits, and the header says " +
+                           std::to_string(header.samples) + " of " + std::to_string(header.bitsAllocated));
+  if (!head.colours.empty() && IsYbr(head.colours) != IsYbr(header.photometric))
+    FailPixels(header, "the colours of frame " + std::to_string(picture + 1) + " are " + head.colours +
+                           ", others than those of the first");
 }
 
 bool Decode(const DicomHeader& header, const std::vector<std::string>& fragments, std::uint64_t bytes, char* out)
@@ -75,43 +180,53 @@ private:
 
 } // namespace
 
+std::string ColoursOfDicomStream(const DicomHeader& header)
+{
+  std::string bytes;
+  Items items(header);
+  items.Next(bytes) && items.Next(bytes, longestHead); // the table, the first fragment
+  const std::string colours = HeadOf(bytes).colours;
+  return colours.empty() || IsYbr(colours) == IsYbr(header.photometric) ? header.photometric : colours;
+}
+
 std::vector<std::string> ReadDicomFragments(const DicomHeader& header)
 {
-  std::ifstream stream(header.path, std::ios::binary);
   const gdcm::TransferSyntax::TSType syntax = gdcm::TransferSyntax::GetTSType(header.transferSyntax.c_str());
+  if (syntax == gdcm::TransferSyntax::TS_END)
+    FailPixels(header, ofUnknownKind);
+  std::string table, fragment;
+  Items items(header);
+  items.Next(table);
   std::vector<std::string> fragments;
-  std::uint64_t at = header.pixelOffset;
-  const std::uint64_t end = at + header.pixelBytes;
-  stream.seekg(static_cast<std::streamoff>(at));
-  for (bool table = true; at < end; table = false) {
-    unsigned char b[8];
-    if (end - at < 8 || !stream.read(reinterpret_cast<char*>(b), 8))
-      FailPixels(header);
-    at += 8;
-    const std::uint32_t bytes = std::uint32_t{b[7]} << 24 | std::uint32_t{b[6]} << 16 | std::uint32_t{b[5]} << 8 | b[4];
-    if (b[2] == 0xDD) // the end of the sequence
-      break;
-    if (bytes > end - at)
-      FailPixels(header);
-    std::string fragment(bytes, '\0');
-    if (!stream.read(fragment.data(), static_cast<std::streamsize>(bytes)))
-      FailPixels(header);
-    at += bytes;
-    if (!table) // the first item is a table of offsets
-      fragments.push_back(std::move(fragment));
+  std::vector<std::uint64_t> places; // of fragments, as the table counts them
+  const std::uint64_t first = items.At();
+  for (std::uint64_t at = first; items.Next(fragment); at = items.At()) {
+    fragments.push_back(std::move(fragment));
+    places.push_back(at - first);
   }
   const std::size_t pictures = header.pictures.size();
-  if (syntax == gdcm::TransferSyntax::TS_END || fragments.size() < pictures || (pictures > 1 && fragments.size() != pictures))
-    FailPixels(header);
-  const bool isRle = syntax == gdcm::TransferSyntax::RLELossless;
+  std::vector<std::string> frames;
   for (std::size_t i = 0; i < fragments.size(); ++i) {
-    const std::string& f = fragments[i];
-    const auto begins = [&f](const char* mark, std::size_t count) { return f.compare(0, count, mark, count) == 0; };
-    const bool first = pictures > 1 || i == 0;
-    if (first && (isRle ? f.size() < 64 : !begins("\xFF\xD8", 2) && !begins("\xFF\x4F\xFF\x51", 4) && !begins("\0\0\0\x0CjP", 6)))
-      FailPixels(header);
+    const std::size_t entry = 4 * frames.size(); // of the next one
+    const bool isListed = entry + 4 <= table.size() && Number(table, entry) == places[i];
+    if (i == 0 || (pictures > 1 && (fragments.size() == pictures || isListed)))
+      frames.push_back(std::move(fragments[i]));
+    else
+      frames.back() += fragments[i];
   }
-  return fragments;
+  if (frames.size() != pictures)
+    FailPixels(header,
+               "its " + std::to_string(pictures) + " frames lie in " + std::to_string(fragments.size()) + " fragments, and " +
+                   (table.empty() ? "no table of offsets says" : "its table of offsets does not say") + " which belong together");
+  for (std::size_t i = 0; i < pictures; ++i) {
+    const std::string& f = frames[i];
+    const auto begins = [&f](const char* mark, std::size_t count) { return f.compare(0, count, mark, count) == 0; };
+    const bool isRle = syntax == gdcm::TransferSyntax::RLELossless;
+    if (isRle ? f.size() < 64 : !begins("\xFF\xD8", 2) && !begins("\xFF\x4F\xFF\x51", 4) && !begins("\0\0\0\x0CjP", 6))
+      FailPixels(header, ofUnknownKind);
+    CheckHead(header, isRle ? StreamHead() : HeadOf(f), i);
+  }
+  return frames;
 }
 
 std::vector<char> DecodeDicomPixels(const DicomHeader& header, const Progress& progress, double fraction)
@@ -133,7 +248,7 @@ std::vector<char> DecodeDicomPixels(const DicomHeader& header, const Progress& p
   case TaskOutcome::Succeeded:
     break;
   case TaskOutcome::Failed:
-    FailPixels(header);
+    FailPixels(header, ofUnknownKind);
   case TaskOutcome::TimedOut:
     FailFile(header.path, "its pixels are damaged: decoding them did not come to an end");
   }

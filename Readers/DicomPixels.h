@@ -7,8 +7,13 @@
 
 namespace echorama {
 
-/// The compressed pixels of an encapsulated file, as gdcm's codecs take them: one fragment per picture, or all of one picture.
-/// What does not begin as its transfer syntax says is kept from the codecs.
+/// The photometric interpretation of an encapsulated file: what the first picture's lossy JPEG says of itself (by its marks of
+/// JFIF or Adobe, or its sampling), else what the header says, which may be that of the pixels before they were compressed.
+/// \throws Error(BadFile) when the fragments are damaged.
+std::string ColoursOfDicomStream(const DicomHeader& header);
+
+/// The compressed pixels of an encapsulated file, as gdcm's codecs take them: one fragment per picture.
+/// What does not begin as its transfer syntax says, or says other than the header what its pixels are, is kept from the codecs.
 /// \throws Error(BadFile) when the fragments are damaged, or of a syntax that is not known.
 std::vector<std::string> ReadDicomFragments(const DicomHeader& header);
 

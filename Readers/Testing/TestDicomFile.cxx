@@ -6,10 +6,14 @@
 #include "Readers/DicomFile.h"
 #include "Readers/DicomHeader.h"
 #include "Testing/TemporaryFolder.h"
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
 #include <ctime>
 #include <gdcmImageChangeTransferSyntax.h>
 #include <gdcmImageReader.h>
 #include <gdcmImageWriter.h>
+#include <jpeglib.h>
 #include <sys/stat.h>
 #include <zlib.h>
 
@@ -93,6 +97,62 @@ std::string Deflated(const std::string& elements)
   return StartOf("1.2.840.10008.1.2.1.99") + packed;
 }
 
+// A JPEG of 16 x 16 equal pixels, one number each or three (red, green, blue), which are stored as another space.
+struct Jpeg {
+  std::vector<unsigned char> colour{200, 50, 20}; // whose luminance is 91
+  J_COLOR_SPACE stored = JCS_YCbCr;
+  bool jfif = false, adobe = false, coarse = false;
+
+  std::string Bytes() const
+  {
+    jpeg_compress_struct jpeg;
+    jpeg_error_mgr errors;
+    jpeg.err = jpeg_std_error(&errors);
+    jpeg_create_compress(&jpeg);
+    unsigned char* bytes = nullptr;
+    unsigned long count = 0;
+    jpeg_mem_dest(&jpeg, &bytes, &count);
+    jpeg.image_width = jpeg.image_height = 16;
+    jpeg.input_components = static_cast<int>(colour.size());
+    jpeg.in_color_space = colour.size() == 1 ? JCS_GRAYSCALE : JCS_RGB;
+    jpeg_set_defaults(&jpeg);
+    jpeg_set_quality(&jpeg, 100, TRUE);
+    jpeg_set_colorspace(&jpeg, colour.size() == 1 ? JCS_GRAYSCALE : stored);
+    jpeg.write_JFIF_header = jfif ? TRUE : FALSE;
+    jpeg.write_Adobe_marker = adobe ? TRUE : FALSE;
+    jpeg.comp_info[0].h_samp_factor = jpeg.comp_info[0].v_samp_factor = coarse ? 2 : 1;
+    jpeg_start_compress(&jpeg, TRUE);
+    std::vector<unsigned char> row;
+    for (int i = 0; i < 16; ++i)
+      row.insert(row.end(), colour.begin(), colour.end());
+    for (int i = 0; i < 16; ++i) {
+      JSAMPROW pixels = row.data();
+      jpeg_write_scanlines(&jpeg, &pixels, 1);
+    }
+    jpeg_finish_compress(&jpeg);
+    jpeg_destroy_compress(&jpeg);
+    std::string text(reinterpret_cast<char*>(bytes), count);
+    std::free(bytes);
+    return text + std::string(text.size() % 2, '\0');
+  }
+};
+
+// A file of compressed frames of 16 x 16 pixels: a table of offsets, and fragments.
+std::string Compressed(const std::string& colours, int samples, const std::vector<std::string>& fragments, int frames = 1,
+                       const std::string& table = "", int bits = 8, const std::string& syntax = "1.2.840.10008.1.2.4.50")
+{
+  const auto number = [](int element, int value) {
+    return Element(0x28, element, "US", Number(static_cast<std::uint64_t>(value), 2));
+  };
+  std::string items = Item(table, static_cast<std::uint32_t>(table.size()));
+  for (const std::string& fragment : fragments)
+    items += Item(fragment, static_cast<std::uint32_t>(fragment.size()));
+  return StartOf(syntax) + Element(0x18, 0x88, "DS", "1") + number(2, samples) + Element(0x28, 4, "CS", colours) +
+         (samples == 3 ? number(6, 0) : "") + Element(0x28, 8, "IS", std::to_string(frames)) + number(0x10, 16) +
+         number(0x11, 16) + Element(0x28, 0x30, "DS", "1\\1") + number(0x100, bits) + number(0x101, bits) +
+         number(0x102, bits - 1) + number(0x103, 0) + Element(0x7FE0, 0x10, "OB", items + EndOfSequence, Undefined);
+}
+
 class DicomFile : public TemporaryFolder {
 protected:
   void ExpectBad(const std::string& elements, const std::string& words) const
@@ -117,6 +177,27 @@ protected:
     writer.SetFileName(to.c_str());
     ASSERT_TRUE(writer.Write());
     std::filesystem::rename(to, from);
+  }
+
+  // The first pixel of each slice, and the notes.
+  std::pair<std::vector<int>, std::string> Greys(const std::string& file) const
+  {
+    const auto source = OpenVolume(Put("grey.dcm", file));
+    const auto& n = source->Content().geometry.dimensions;
+    std::vector<unsigned char> voxels(source->Content().geometry.VoxelCount());
+    source->Read(0, voxels.data(), nullptr);
+    std::vector<int> greys;
+    for (int k = 0; k < n[2]; ++k)
+      greys.push_back(voxels[static_cast<std::size_t>(k * n[0] * n[1])]);
+    std::string notes;
+    for (const std::string& note : source->Content().notes)
+      notes += note + "\n";
+    return {greys, notes};
+  }
+
+  void ExpectBadPixels(const std::string& file, const std::string& words) const
+  {
+    ExpectRefused([&] { Greys(file); }, Error::Kind::BadFile, Path("grey.dcm"), words);
   }
 
   void PutSlices(int count, int bits = 8) const
@@ -257,6 +338,102 @@ TEST_F(DicomFile, DamagedStructure)
     nested += Tag(0x20, 0x9301) + "SQ" + Number(0, 2) + Number(Undefined, 4) + Tag(0xFFFE, 0xE000) + Number(Undefined, 4);
   ExpectBad(nested, "nested");
   ExpectBad("", "");
+}
+
+// Colours of JPEG are what its marks say, or its sampling; without these, what the header says.
+TEST_F(DicomFile, ColoursOfJpeg)
+{
+  Jpeg jfif, adobe, coarse, plain, rgb, plainRgb;
+  jfif.jfif = adobe.adobe = rgb.adobe = coarse.coarse = true;
+  rgb.stored = plainRgb.stored = JCS_RGB;
+  std::string filled = jfif.Bytes(); // any number of bytes 0xFF may stand before a mark
+  filled.insert(2, "\xFF\xFF");
+  const std::string aProfile = std::string("\xFF\xE2\xFF\xFF", 4) + std::string(65533, 'p');
+  std::string far = adobe.Bytes(); // beyond the first 64 kB
+  far.insert(2, aProfile + aProfile);
+  const struct {
+    const char* header;
+    std::string jpeg, noted;
+  } cases[] = {{"RGB", jfif.Bytes(), "YBR_FULL"},
+               {"RGB", adobe.Bytes(), "YBR_FULL"},
+               {"RGB", coarse.Bytes(), "YBR_FULL"},
+               {"RGB", filled, "YBR_FULL"},
+               {"RGB", far, "YBR_FULL"},
+               {"YBR_FULL_422", rgb.Bytes(), "JPEG that they are RGB"},
+               {"YBR_FULL_422", jfif.Bytes(), ""},
+               {"YBR_FULL_422", coarse.Bytes(), ""},
+               {"YBR_FULL", plain.Bytes(), ""},
+               {"RGB", rgb.Bytes(), ""},
+               {"RGB", plainRgb.Bytes(), ""}};
+  for (const auto& [header, jpeg, noted] : cases) {
+    const auto [greys, notes] = Greys(Compressed(header, 3, {jpeg}));
+    EXPECT_NEAR(greys.at(0), 91, 2) << header << noted;
+    EXPECT_EQ(notes.find("JPEG") != std::string::npos, !noted.empty()) << header << notes;
+    EXPECT_NE(notes.find(noted), std::string::npos) << header << notes;
+  }
+  ExpectBadPixels(Compressed("RGB", 3, {rgb.Bytes(), jfif.Bytes()}, 2), "the colours of frame 2 are YBR_FULL");
+}
+
+TEST_F(DicomFile, CompressedPixelsOfAnotherTypeThanTheHeaders)
+{
+  Jpeg grey, colours;
+  grey.colour = {77};
+  colours.jfif = true;
+  EXPECT_NEAR(Greys(Compressed("MONOCHROME2", 1, {grey.Bytes()})).first.at(0), 77, 1);
+  ExpectBadPixels(Compressed("MONOCHROME2", 1, {colours.Bytes()}), "3 numbers of 8 bits, and the header says 1 of 8");
+  ExpectBadPixels(Compressed("RGB", 3, {grey.Bytes()}), "1 numbers of 8 bits, and the header says 3 of 8");
+  ExpectBadPixels(Compressed("MONOCHROME2", 1, {grey.Bytes(), colours.Bytes()}, 2), "frame 2");
+  ExpectBadPixels(Compressed("MONOCHROME2", 1, {grey.Bytes()}, 1, "", 16), "1 numbers of 8 bits, and the header says 1 of 16");
+  const std::string jpeg2000 = std::string("\xFF\x4F\xFF\x51", 4) + std::string(36, '\0') + std::string("\0\1\x07\1\1\0", 6);
+  ExpectBadPixels(Compressed("MONOCHROME2", 1, {jpeg2000}, 1, "", 16, "1.2.840.10008.1.2.4.90"), "1 numbers of 8 bits");
+
+  // Lossless JPEG of 8 bits is widened to the 16 that are allocated.
+  PutSlices(1);
+  Compress(0, gdcm::TransferSyntax::JPEGLosslessProcess14_1);
+  std::stringstream whole;
+  whole << std::ifstream(Path("s0"), std::ios::binary).rdbuf();
+  std::string wide = whole.str();
+  const std::string allocated = Element(0x28, 0x100, "US", Number(8, 2));
+  wide.replace(wide.find(allocated), allocated.size(), Element(0x28, 0x100, "US", Number(16, 2)));
+  const auto source = OpenVolume(Put("s0", wide));
+  std::vector<std::uint16_t> voxels(48);
+  source->Read(0, voxels.data(), nullptr);
+  for (int i = 0; i < 48; ++i)
+    EXPECT_EQ(voxels[static_cast<std::size_t>(i)], i * 5);
+}
+
+// Three frames in one, two and three fragments.
+TEST_F(DicomFile, FragmentsAreJoinedByTheirTable)
+{
+  std::vector<std::string> fragments, frames;
+  std::string table;
+  std::size_t at = 0;
+  for (int k = 0; k < 3; ++k) {
+    Jpeg jpeg;
+    jpeg.colour = {static_cast<unsigned char>(20 + 70 * k)};
+    frames.push_back(jpeg.Bytes());
+    table += Number(at, 4);
+    const std::size_t part = frames[static_cast<std::size_t>(k)].size() / static_cast<std::size_t>(k + 1) / 2 * 2;
+    for (int i = 0; i <= k; ++i) {
+      fragments.push_back(frames.back().substr(static_cast<std::size_t>(i) * part, i == k ? std::string::npos : part));
+      at += 8 + fragments.back().size();
+    }
+  }
+  const auto expectFrames = [this](const std::string& file) {
+    const std::vector<int> greys = Greys(file).first;
+    ASSERT_EQ(greys.size(), 3u);
+    for (int k = 0; k < 3; ++k)
+      EXPECT_NEAR(greys[static_cast<std::size_t>(k)], 20 + 70 * k, 1) << k;
+  };
+  expectFrames(Compressed("MONOCHROME2", 1, fragments, 3, table));
+  expectFrames(Compressed("MONOCHROME2", 1, frames, 3, table)); // one each: whatever the table says
+  expectFrames(Compressed("MONOCHROME2", 1, frames, 3));
+  EXPECT_NEAR(Greys(Compressed("MONOCHROME2", 1, {fragments.end() - 3, fragments.end()}, 1)).first.at(0), 160, 1);
+  ExpectBadPixels(Compressed("MONOCHROME2", 1, fragments, 3), "3 frames lie in 6 fragments, and no table");
+  std::string wrong = table;
+  wrong[8] = static_cast<char>(wrong[8] + 2);
+  for (const std::string& other : {wrong, table.substr(4), table.substr(0, 8), table.substr(0, 10)})
+    ExpectBadPixels(Compressed("MONOCHROME2", 1, fragments, 3, other), "its table of offsets does not say");
 }
 
 // To open it, no more than its head; to read it, up to the end of its pixels.
