@@ -111,14 +111,17 @@ private:
     while (lines_.Next(line) && !line.empty()) {
       if (line[0] == '#')
         continue;
-      const std::size_t colon = line.find(':');
+      const std::size_t assigns = line.find(":="); // keys may hold colons: DICOM:Modality:=US
+      const bool isKey = assigns < line.find(": ");
+      const std::size_t colon = isKey ? assigns : line.find(':');
       if (colon == std::string::npos)
         lines_.FailHere("\"field: value\" or \"key:=value\" is needed");
-      const std::string_view before = std::string_view(line).substr(0, colon), after = std::string_view(line).substr(colon + 1);
-      if (!after.empty() && after[0] == '=') {
-        if (sequence_ && TakeFrameField(lines_, *sequence_, TrimBlanks(before), Unescaped(TrimBlanks(after.substr(1)))))
+      const std::string_view before = std::string_view(line).substr(0, colon),
+                             after = std::string_view(line).substr(colon + (isKey ? 2 : 1));
+      if (isKey) {
+        if (sequence_ && TakeFrameField(lines_, *sequence_, TrimBlanks(before), Unescaped(TrimBlanks(after))))
           continue;
-        header_.fields.emplace_back(Unescaped(TrimBlanks(before)), Unescaped(after.substr(1)));
+        header_.fields.emplace_back(Unescaped(TrimBlanks(before)), Unescaped(after));
       } else if (const auto [place, fresh] = fields_.emplace(Plain(before), TrimBlanks(after)); !fresh)
         lines_.FailHere("\"" + place->first + "\" is given twice");
     }
@@ -128,7 +131,7 @@ private:
   std::vector<Vector> Vectors(const char* field, const std::string& text) const
   {
     std::vector<Vector> vectors;
-    for (std::size_t at = text.find_first_not_of(' '); at != std::string::npos;) {
+    for (std::size_t at = text.find_first_not_of(" \t"); at != std::string::npos;) {
       std::size_t end;
       if (text[at] == '(') {
         end = text.find(')', at);
@@ -143,12 +146,12 @@ private:
         vectors.emplace_back(Eigen::Vector3d(numbers[0], numbers[1], count == 3 ? numbers[2] : 0.0));
         ++end;
       } else {
-        end = std::min(text.find(' ', at), text.size());
+        end = std::min(text.find_first_of(" \t", at), text.size());
         if (text.compare(at, end - at, "none") != 0)
           lines_.Fail(std::string(field) + " holds \"" + text.substr(at, end - at) + "\"; a vector or none is needed");
         vectors.emplace_back();
       }
-      at = text.find_first_not_of(' ', end);
+      at = text.find_first_not_of(" \t", end);
     }
     return vectors;
   }

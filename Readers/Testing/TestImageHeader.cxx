@@ -140,6 +140,9 @@ TEST_F(ImageHeaderTest, OtherFieldsAreKept)
   std::string nrrd = Nrrd();
   nrrd.insert(9, "one:=first\\nsecond \\\\ line\ntwo:=a: b := c\n");
   EXPECT_EQ(Read("a.nrrd", nrrd).fields, (std::vector<HeaderField>{{"one", "first\nsecond \\ line"}, {"two", "a: b := c"}}));
+  nrrd = Nrrd({{"content", "a:=b"}}); // a field
+  nrrd.insert(9, "DICOM:Modality:=US\nDICOM:Maker:=X: y\n");
+  EXPECT_EQ(Read("a.nrrd", nrrd).fields, (std::vector<HeaderField>{{"DICOM:Modality", "US"}, {"DICOM:Maker", "X: y"}}));
 }
 
 TEST_F(ImageHeaderTest, NrrdSpacesBecomeLps)
@@ -153,6 +156,8 @@ TEST_F(ImageHeaderTest, NrrdSpacesBecomeLps)
       Nrrd({{"space", "LAS"}, {"space directions", "( 0, -0.25 ,0) (-0.5,0,0)  (0,0,2)"}, {"space origin", "(10,-20,-30.5)"}}));
   ExpectTheUsualGeometry(las);
   EXPECT_TRUE(las.notes.empty());
+  ExpectTheUsualGeometry(Read(
+      "tabs.nrrd", Nrrd({{"space directions", "\t(0,0.25,0)\t( -0.5,0,0) \t(0,0,2)\t"}, {"space origin", "\t(10,20,-30.5)"}})));
   const ImageHeader none = Read("none.nrrd", Nrrd({{"space", ""}, {"space dimension", "3"}}));
   ExpectTheUsualGeometry(none);
   EXPECT_EQ(none.notes.size(), 1u);
