@@ -140,6 +140,8 @@ std::vector<NamedTransform> ReadTransforms(const std::string& path, const CycleT
   if (first != '<' && first != '{')
     file.Fail("it is neither a configuration of Plus (XML) nor transforms in JSON");
   std::vector<NamedTransform> given = first == '<' ? PlusTransforms(begin, file) : JsonTransforms(begin, file);
+  if (given.size() > 1000) // a room has a dozen; the time that CheckCycles takes may grow with their square
+    file.Fail("it holds " + std::to_string(given.size()) + " transforms; no more than 1000 are read");
 
   std::vector<NamedTransform> transforms;
   TransformGraph graph;

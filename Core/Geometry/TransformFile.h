@@ -19,8 +19,8 @@ namespace echorama {
 /// singular (it leads one way only), its last row must be 0 0 0 1.
 /// \throws Error(FileSystem) when the file cannot be read, Error(BadFile) that names file and transform: neither format,
 /// no CoordinateDefinitions, another schema or unit, a missing name or matrix, numbers that are too few, too many or not
-/// finite, a transform from a frame to itself, an edge given twice with different matrices, or a cycle that does not close
-/// within \a tolerance.
+/// finite, a transform from a frame to itself, an edge given twice with different matrices, more than 1000 transforms, or a
+/// cycle that does not close within \a tolerance.
 std::vector<NamedTransform> ReadTransforms(const std::string& path, const CycleTolerance& tolerance = {});
 
 /// Writes the JSON format under a temporary name and renames. Numbers come back to the last bit. \a report, the text of a JSON

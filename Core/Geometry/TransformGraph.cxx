@@ -198,10 +198,8 @@ std::map<std::string, TransformGraph::Step> TransformGraph::Tree(const std::stri
 std::vector<TransformGraph::Step> TransformGraph::Way(const std::map<std::string, Step>& tree, std::string to)
 {
   std::vector<Step> way;
-  for (Step step = tree.at(to); step.edge; step = tree.at(to)) {
-    way.push_back(step);
-    to = step.inverse ? step.edge->to : step.edge->from;
-  }
+  for (Step step = tree.at(to); step.edge; step = tree.at(to))
+    to = way.emplace_back(step).From();
   std::reverse(way.begin(), way.end());
   return way;
 }
@@ -244,8 +242,7 @@ std::vector<OpenCycle> TransformGraph::CheckCycles(const CycleTolerance& toleran
   for (const auto& [frame, neighbours] : neighbours_) {
     if (rootOf.count(frame) != 0)
       continue;
-    trees[frame] = Tree(frame, true);
-    for (const auto& reached : trees[frame])
+    for (const auto& reached : trees[frame] = Tree(frame, true))
       rootOf.emplace(reached.first, frame);
   }
 
@@ -281,7 +278,7 @@ std::vector<OpenCycle> TransformGraph::CheckCycles(const CycleTolerance& toleran
     std::rotate(cycle.begin(), cycle.begin() + static_cast<std::ptrdiff_t>(begin), cycle.end());
 
     OpenCycle result;
-    result.frame = cycle.front().inverse ? cycle.front().edge->to : cycle.front().edge->from;
+    result.frame = cycle.front().From();
     Eigen::Affine3d product = Eigen::Affine3d::Identity();
     for (const Step& step : cycle) {
       product = step.Matrix() * product;

@@ -97,7 +97,7 @@ public:
   ComposedTransform Find(const std::string& from, const std::string& to) const;
 
   /// The cycles that do not close: one for each edge beyond a spanning tree of fewest edges. Edges that are not Valid or
-  /// that cannot be inverted are left out.
+  /// that cannot be inverted are left out. The time may grow with the square of the edges: 0.1 s for 1000.
   std::vector<OpenCycle> CheckCycles(const CycleTolerance& tolerance = {}) const;
 
   bool Empty() const { return edges_.empty(); }
@@ -111,6 +111,7 @@ private:
   struct Step { // along one edge, or against it
     const NamedTransform* edge = nullptr;
     bool inverse = false;
+    const std::string& From() const { return inverse ? edge->to : edge->from; }
     std::string Name() const;
     Eigen::Affine3d Matrix() const;
   };

@@ -248,6 +248,22 @@ TEST_F(TransformFile, AttacksAreRefusedQuickly)
   Refused("{\"schema\":\"" + std::string(million, 'x') + "\"}", "...");
 }
 
+TEST_F(TransformFile, TooManyAreRefused)
+{
+  const auto ladder = [](int count) { // of two rails, whose rungs close cycles of up to all of them
+    std::string text;
+    for (int i = 0; i < count; ++i)
+      text += Element("F" + std::to_string(i / 2), "F" + std::to_string(i / 2 + 1 + i % 2));
+    return Plus(text);
+  };
+  EXPECT_EQ(Read(ladder(1000)).size(), 1000u);
+  Refused(ladder(1001), "it holds 1001 transforms");
+  std::string same = Object();
+  for (int i = 0; i < 1000; ++i)
+    same += "," + Object();
+  Refused(Ours(same), "it holds 1001 transforms");
+}
+
 TEST_F(TransformFile, AFailedWriteLeavesWhatWasThere)
 {
   std::vector<NamedTransform> transforms{SomeTransform(1)};
