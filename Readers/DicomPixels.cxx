@@ -118,9 +118,9 @@ void CheckHead(const DicomHeader& header, const StreamHead& head, std::size_t pi
   const int room = head.bits > 16 ? 32 : head.bits > 8 ? 16 : 8;
   const bool fits = head.lossless ? room <= header.bitsAllocated : room == header.bitsAllocated;
   if (head.numbers > 0 && (head.numbers != header.samples || !fits))
-    FailPixels(header, "those of frame " + std::to_string(picture + 1) + " are compressed as " + std::to_string(head.numbers) +
-                           " numbers of " + std::to_string(head.bits) + " bits, and the header says " +
-                           std::to_string(header.samples) + " of " + std::to_string(header.bitsAllocated));
+    FailPixels(header, "frame " + std::to_string(picture + 1) + " is compressed with " + std::to_string(head.numbers) + " x " +
+                           std::to_string(head.bits) + " bits per pixel, and the header says " + std::to_string(header.samples) +
+                           " x " + std::to_string(header.bitsAllocated));
   if (!head.colours.empty() && IsYbr(head.colours) != IsYbr(header.photometric))
     FailPixels(header, "the colours of frame " + std::to_string(picture + 1) + " are " + head.colours +
                            ", others than those of the first");

@@ -99,7 +99,7 @@ std::string Deflated(const std::string& elements)
 
 // A JPEG of 16 x 16 equal pixels, one number each or three (red, green, blue), which are stored as another space.
 struct Jpeg {
-  std::vector<unsigned char> colour{200, 50, 20}; // whose luminance is 91
+  std::string colour = "\xC8\x32\x14"; // 200, 50, 20, whose luminance is 91
   J_COLOR_SPACE stored = JCS_YCbCr;
   bool jfif = false, adobe = false, coarse = false;
 
@@ -377,15 +377,15 @@ TEST_F(DicomFile, ColoursOfJpeg)
 TEST_F(DicomFile, CompressedPixelsOfAnotherTypeThanTheHeaders)
 {
   Jpeg grey, colours;
-  grey.colour = {77};
+  grey.colour = "M"; // 77
   colours.jfif = true;
   EXPECT_NEAR(Greys(Compressed("MONOCHROME2", 1, {grey.Bytes()})).first.at(0), 77, 1);
-  ExpectBadPixels(Compressed("MONOCHROME2", 1, {colours.Bytes()}), "3 numbers of 8 bits, and the header says 1 of 8");
-  ExpectBadPixels(Compressed("RGB", 3, {grey.Bytes()}), "1 numbers of 8 bits, and the header says 3 of 8");
+  ExpectBadPixels(Compressed("MONOCHROME2", 1, {colours.Bytes()}), "3 x 8 bits per pixel, and the header says 1 x 8");
+  ExpectBadPixels(Compressed("RGB", 3, {grey.Bytes()}), "1 x 8 bits per pixel, and the header says 3 x 8");
   ExpectBadPixels(Compressed("MONOCHROME2", 1, {grey.Bytes(), colours.Bytes()}, 2), "frame 2");
-  ExpectBadPixels(Compressed("MONOCHROME2", 1, {grey.Bytes()}, 1, "", 16), "1 numbers of 8 bits, and the header says 1 of 16");
+  ExpectBadPixels(Compressed("MONOCHROME2", 1, {grey.Bytes()}, 1, "", 16), "1 x 8 bits per pixel, and the header says 1 x 16");
   const std::string jpeg2000 = std::string("\xFF\x4F\xFF\x51", 4) + std::string(36, '\0') + std::string("\0\1\x07\1\1\0", 6);
-  ExpectBadPixels(Compressed("MONOCHROME2", 1, {jpeg2000}, 1, "", 16, "1.2.840.10008.1.2.4.90"), "1 numbers of 8 bits");
+  ExpectBadPixels(Compressed("MONOCHROME2", 1, {jpeg2000}, 1, "", 16, "1.2.840.10008.1.2.4.90"), "1 x 8 bits per pixel");
 
   // Lossless JPEG of 8 bits is widened to the 16 that are allocated.
   PutSlices(1);
@@ -410,7 +410,7 @@ TEST_F(DicomFile, FragmentsAreJoinedByTheirTable)
   std::size_t at = 0;
   for (int k = 0; k < 3; ++k) {
     Jpeg jpeg;
-    jpeg.colour = {static_cast<unsigned char>(20 + 70 * k)};
+    jpeg.colour = std::string(1, static_cast<char>(20 + 70 * k));
     frames.push_back(jpeg.Bytes());
     table += Number(at, 4);
     const std::size_t part = frames[static_cast<std::size_t>(k)].size() / static_cast<std::size_t>(k + 1) / 2 * 2;
