@@ -323,7 +323,8 @@ std::optional<Backup> Backups::NewestFor(const std::string& path, const timespec
                          (backup.time == saved.tv_sec && stat(backup.path.c_str(), &file) == 0 && IsBefore(file.st_mtim, saved)))
       continue;
     echorama::Read(backup);
-    if (backup.readable && (!isNumbered || backup.lineage == last.lineage))
+    // Of a project that had no lineage yet, each window has begun one of its own.
+    if (backup.readable && (!isNumbered || backup.lineage == last.lineage || last.others.count(backup.number) > 0))
       return backup;
   }
   return std::nullopt;

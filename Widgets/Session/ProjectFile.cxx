@@ -349,9 +349,12 @@ Project ReadProject(const std::string& path, BackupStamp* stamp)
     const JsonPlace place = file.In("lastBackup");
     project.lastBackup = {place.In("lineage").Text(place.Member(root["lastBackup"], "lineage")),
                           Count(place.Member(root["lastBackup"], "number"), place.In("number"))};
-    if (root["lastBackup"].contains("others"))
-      for (const Json& other : root["lastBackup"]["others"])
+    if (const Json& last = root["lastBackup"]; last.contains("others")) {
+      if (!last["others"].is_array())
+        place.In("others").Fail("a list is needed");
+      for (const Json& other : last["others"])
         project.lastBackup.others.insert(Count(other, place.In("others")));
+    }
   }
   if (stamp)
     *stamp = found;

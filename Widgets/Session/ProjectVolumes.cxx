@@ -81,12 +81,16 @@ void CheckMayBeReplaced(const std::string& path, const SessionState& state, cons
 std::string DisplacementNote(const std::string& path)
 {
   std::string names;
+  bool isNamed = false; // most have none
   try {
-    if (ReadTextFile(path).find("\"displacement\"") != std::string::npos) // most have none
+    isNamed = ReadTextFile(path).find("\"displacement\"") != std::string::npos;
+    if (isNamed)
       for (const VolumePose& pose : ReadPoses(path))
         if (!pose.displacement.empty())
           names += (names.empty() ? "" : ", ") + fs::path(pose.file).filename().string();
-  } catch (const Error&) { // it is something else, or not there
+  } catch (const Error&) {
+    if (isNamed) // else it is something else, or not there
+      names = "volumes that cannot be read";
   }
   return names.empty() ? names : path + ": its displacements (of " + names + ") are neither shown here nor kept";
 }

@@ -97,9 +97,9 @@ std::string SessionStorage::Save(const std::string& given, Project project, bool
   const bool goesOn = path_ == path;
   const std::set<int> all = Backups::NumbersFor(path), ours = writer_ ? writer_->Numbers() : std::set<int>();
   project.lastBackup = {goesOn && !lineage_.empty() ? lineage_ : NewLineage(),
-                        std::max(goesOn ? saved_.lastBackup.number : 0, LastOf(all))};
+                        std::min(std::max(goesOn ? saved_.lastBackup.number : 0, LastOf(all)), LargestNumber)};
   for (const int number : all)
-    if (goesOn && number > offered_ && ours.count(number) == 0)
+    if (goesOn && number > offered_ && number <= LargestNumber && ours.count(number) == 0)
       project.lastBackup.others.insert(number);
   WriteProject(path, project);
   saved_ = project;

@@ -211,6 +211,18 @@ TEST_F(SessionOnDisk, WhatAnotherWindowHasNotSavedIsLaterWhateverThisOneSaves)
   next.Opened(path, ReadProject(path), SessionStorage::FingerprintOf(path));
   next.Save(path, Step(12));
   EXPECT_EQ(later(12), 0);
+  // A file without a lineage, such as poses: each window has begun its own.
+  const std::string poses = Path("poses.json");
+  WriteProject(poses, Step(1));
+  SessionStorage one, two;
+  for (SessionStorage* each : {&one, &two})
+    each->Opened(poses, ReadProject(poses), SessionStorage::FingerprintOf(poses));
+  one.BackUp(Step(30), "of one", true);
+  two.BackUp(Step(31), "of two", true);
+  one.Save(poses, Step(32));
+  SessionStorage again;
+  again.Opened(poses, ReadProject(poses), SessionStorage::FingerprintOf(poses));
+  EXPECT_EQ(ReadProject(again.LaterBackup(Step(32), {})).state.volumes[0].volumeToWorld.translation().x(), 31.0);
   // What was taken along to another name is of the same window.
   const std::string moved = Path("q.json");
   SessionStorage unsaved;
@@ -231,6 +243,8 @@ TEST_F(SessionOnDisk, ALargeNumberOfTheLastBackupLeavesRoomForMore)
   storage.BackUp(Step(2), "later", true);
   EXPECT_EQ(Labels(storage), (std::vector<std::string>{"later"}));
   EXPECT_NE(storage.LaterBackup(Step(1), {}), "");
+  storage.Save(path, Step(3));
+  EXPECT_EQ(ReadProject(path).lastBackup.number, LargestNumber) << "it can be read again";
   project.lastBackup.number = LargestNumber + 1;
   WriteProject(path, project);
   EXPECT_THROW(ReadProject(path), Error);
@@ -249,6 +263,8 @@ TEST_F(SessionOnDisk, TheTruthAndPosesWithDisplacementsAreNotReplaced)
   const std::string before = Text(Path("bent.json"));
   EXPECT_THROW(storage.Save(Path("bent.json"), project), Error);
   EXPECT_EQ(Text(Path("bent.json")), before);
+  Put(Path("bent.json"), before + before);
+  EXPECT_THROW(storage.Save(Path("bent.json"), project), Error) << "it cannot be read";
   WritePoses(Path("bent.json"), {{volume.file, volume.geometry, volume.volumeToWorld}});
   storage.Save(Path("bent.json"), project);
   EXPECT_TRUE(ReadProject(Path("bent.json")).state == project.state);
