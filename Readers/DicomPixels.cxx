@@ -98,9 +98,10 @@ StreamHead HeadOf(std::string_view s)
       head.numbers = byte(at + 9);
       head.bits = byte(at + 4);
       head.lossless = mark != 0xF7 && (mark & 3) == 3;
-      const bool isYbr = isJfif || transform == 1 || byte(at + 11) != byte(at + 14); // RGB are sampled alike
+      const bool isRgb = transform != 1 && byte(at + 10) == 'R' && byte(at + 13) == 'G' && byte(at + 16) == 'B';
+      const bool isYbr = !isRgb && (isJfif || transform == 1 || byte(at + 11) != byte(at + 14)); // RGB are sampled alike
       if (mark != 0xF7 && !head.lossless && head.numbers == 3)
-        head.colours = isYbr ? "YBR_FULL" : transform == 0 ? "RGB" : "";
+        head.colours = isYbr ? "YBR_FULL" : isRgb || transform == 0 ? "RGB" : "";
       break;
     }
     at += mark == 0xFF ? 1 : 2 + static_cast<std::size_t>(256 * byte(at + 2) + byte(at + 3)); // bytes may come before a mark
@@ -182,9 +183,12 @@ private:
 
 std::string ColoursOfDicomStream(const DicomHeader& header)
 {
-  std::string bytes;
+  std::string bytes, more;
   Items items(header);
   items.Next(bytes) && items.Next(bytes, longestHead); // the table, the first fragment
+  while (header.pictures.size() == 1 && HeadOf(bytes).numbers == 0 && bytes.size() < longestHead &&
+         items.Next(more, longestHead - bytes.size()))
+    bytes += more;
   const std::string colours = HeadOf(bytes).colours;
   return colours.empty() || IsYbr(colours) == IsYbr(header.photometric) ? header.photometric : colours;
 }

@@ -343,9 +343,9 @@ TEST_F(DicomFile, DamagedStructure)
 // Colours of JPEG are what its marks say, or its sampling; without these, what the header says.
 TEST_F(DicomFile, ColoursOfJpeg)
 {
-  Jpeg jfif, adobe, coarse, plain, rgb, plainRgb;
-  jfif.jfif = adobe.adobe = rgb.adobe = coarse.coarse = true;
-  rgb.stored = plainRgb.stored = JCS_RGB;
+  Jpeg jfif, adobe, coarse, plain, rgb, plainRgb, jfifRgb; // the components of RGB are called R, G and B
+  jfif.jfif = adobe.adobe = rgb.adobe = coarse.coarse = jfifRgb.jfif = true;
+  rgb.stored = plainRgb.stored = jfifRgb.stored = JCS_RGB;
   std::string filled = jfif.Bytes(); // any number of bytes 0xFF may stand before a mark
   filled.insert(2, "\xFF\xFF");
   const std::string aProfile = std::string("\xFF\xE2\xFF\xFF", 4) + std::string(65533, 'p');
@@ -364,7 +364,9 @@ TEST_F(DicomFile, ColoursOfJpeg)
                {"YBR_FULL_422", coarse.Bytes(), ""},
                {"YBR_FULL", plain.Bytes(), ""},
                {"RGB", rgb.Bytes(), ""},
-               {"RGB", plainRgb.Bytes(), ""}};
+               {"RGB", plainRgb.Bytes(), ""},
+               {"RGB", jfifRgb.Bytes(), ""},
+               {"YBR_FULL_422", plainRgb.Bytes(), "JPEG that they are RGB"}};
   for (const auto& [header, jpeg, noted] : cases) {
     const auto [greys, notes] = Greys(Compressed(header, 3, {jpeg}));
     EXPECT_NEAR(greys.at(0), 91, 2) << header << noted;
@@ -372,6 +374,8 @@ TEST_F(DicomFile, ColoursOfJpeg)
     EXPECT_NE(notes.find(noted), std::string::npos) << header << notes;
   }
   ExpectBadPixels(Compressed("RGB", 3, {rgb.Bytes(), jfif.Bytes()}, 2), "the colours of frame 2 are YBR_FULL");
+  const std::string whole = adobe.Bytes(); // the marks may lie in several fragments
+  EXPECT_NEAR(Greys(Compressed("RGB", 3, {whole.substr(0, 10), whole.substr(10)})).first.at(0), 91, 2);
 }
 
 TEST_F(DicomFile, CompressedPixelsOfAnotherTypeThanTheHeaders)

@@ -90,9 +90,9 @@ TEST_F(PoseLogFile, EffortGrowsWithTheLengthOfTheFile)
       }
     });
   };
-  EXPECT_LT(seconds(columns(16)), 64 * seconds(columns(1)));
-  EXPECT_LT(seconds(sensors(16)), 64 * seconds(sensors(1)));
-  EXPECT_LT(seconds(arrivals(16)), 64 * seconds(arrivals(1)));
+  EXPECT_LT(seconds(columns(16)), 128 * seconds(columns(1)));
+  EXPECT_LT(seconds(sensors(16)), 128 * seconds(sensors(1)));
+  EXPECT_LT(seconds(arrivals(16)), 128 * seconds(arrivals(1)));
   EXPECT_EQ(ReadPoseLog(Path("sensors1")).poses.size(), 1000u);
   EXPECT_EQ(ReadPoseLog(Path("arrivals1")).poses.back().arrival, 3.0);
 }
