@@ -287,9 +287,11 @@ class MainJob(unittest.TestCase):
 
         # Another run that has written them meanwhile keeps them, even when this one is as good as done.
         (folder / "poses.json").unlink()
-        command = [PROGRAM, "align", *files, "--poses", phantom / "truth.json", "--start", "tracked", "--deformable", *FEWER_POINTS]
+        self.assertEqual(run("phantom", "-o", folder / "fine", "--spacing", 1, "--seed", 5).returncode, 0)
+        command = [PROGRAM, "align", "fine/volume_1.mha", "fine/volume_2.mha", "--poses", "fine/truth.json", "--start", "tracked",
+                   "--deformable", "--control-spacing-mm", "8", "--minimum-gain", "0", *FEWER_POINTS]  # deforms for seconds
         terminal, child = pty.openpty()
-        process = subprocess.Popen([*command, "--minimum-gain", "0"], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=child, cwd=folder)
+        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=child, cwd=folder)
         os.close(child)
         shown = b""
         for piece in pieces_of(terminal):
